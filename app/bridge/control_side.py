@@ -4,7 +4,7 @@ import asyncio
 import logging
 import time
 from collections.abc import Awaitable, Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import TypeVar, cast
 
@@ -164,7 +164,11 @@ async def _connected(unit: Unit, beside: Beside) -> None:
         if received:
             if unit.context is not None:
                 received = unit.context.with_parts(received)
-            log_lines.readings(machine.key, received, await store.add(machine.key, received))
+            added = await store.add(machine.key, received)
+            received = [
+                replace(each, fault=added.refused.get(place, each.fault)) for place, each in enumerate(received)
+            ]
+            log_lines.readings(machine.key, received, added.new)
             position = received[-1].position or position
             unit.news.set()
             async with asyncio.timeout(machine.patience):

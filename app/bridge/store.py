@@ -25,6 +25,7 @@ from app.bridge.store_tables import (
     ADD,
     LATER_COLUMNS,
     SCHEMA,
+    Added,
     Counts,
     Intent,
     Quarantined,
@@ -85,24 +86,25 @@ class Store:
 
     # --- readings
 
-    async def add(self, machine: str, received: Sequence[Received]) -> int:
-        """Store readings of a machine and how far its ring is stored, durably; the number of new ones.
+    async def add(self, machine: str, received: Sequence[Received]) -> Added:
+        """Store readings of a machine and how far its ring is stored, durably.
 
         A key that is known stays as it is: nothing comes twice. Another size under it is another reading, which goes to the
-        quarantine, as the server would refuse it.
+        quarantine, as the server would refuse it; a reading that lies there and comes again is refused again.
         """
         now = time.time()
 
-        def write(database: sqlite3.Connection) -> int:
+        def write(database: sqlite3.Connection) -> Added:
             rows = [
                 (machine, each.key, json.dumps(each.body), "quarantined" if each.fault else "waiting", each.fault, now)
                 for each in received
             ]
             before = database.total_changes
             database.executemany(ADD, rows)
-            added = database.total_changes - before
-            if added < len(rows):
-                added += contradictions(database, machine, received, now)
+            added = Added(database.total_changes - before, {})
+            if added.new < len(rows):
+                more = contradictions(database, machine, received, now)
+                added = Added(added.new + more.new, more.refused)
             if last := received[-1].position:
                 database.execute(
                     "INSERT INTO ring (machine, epoch, sequence, generation) VALUES (?, ?, ?, ?)"
@@ -111,7 +113,7 @@ class Store:
                 )
             return added
 
-        return await self._run(write) if received else 0
+        return await self._run(write) if received else Added(0, {})
 
     async def waiting(self, machine: str, most: int = 100) -> list[Waiting]:
         """The oldest readings that the server does not have yet."""

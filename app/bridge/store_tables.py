@@ -57,6 +57,13 @@ class Waiting(NamedTuple):
     again: bool = False
 
 
+class Added(NamedTuple):
+    """Readings that were stored. new: the number of them that were not there; refused: reasons, by place, of those in the quarantine."""
+
+    new: int
+    refused: dict[int, str]
+
+
 class Quarantined(NamedTuple):
     """A reading that the server, or the bridge, refuses, with the reason. at: when it came, seconds since 1970."""
 
@@ -104,15 +111,17 @@ def in_effect(database: sqlite3.Connection, machine: str, tool_memory: int, numb
     return None if first is None else int(first) - 1
 
 
-def contradictions(database: sqlite3.Connection, machine: str, received: Sequence[Received], now: float) -> int:
-    """Put readings into the quarantine whose key another size has; how many are new there."""
-    before = database.total_changes
-    for each in received:
-        [text] = database.execute(
-            "SELECT body FROM reading WHERE machine = ? AND key = ?", (machine, each.key)
+def contradictions(database: sqlite3.Connection, machine: str, received: Sequence[Received], now: float) -> Added:
+    """Put readings into the quarantine whose key another size has; those that came again and lie there already are refused too."""
+    before, refused = database.total_changes, {}
+    for place, each in enumerate(received):
+        [text, state, lies] = database.execute(
+            "SELECT body, state, reason FROM reading WHERE machine = ? AND key = ?", (machine, each.key)
         ).fetchone()
         known, size = (content.get("measured", content.get("touches")) for content in (json.loads(text), each.body))
         if known == size:
+            if state == "quarantined":
+                refused[place] = str(lies)
             continue
         reason = (
             f"Key {each.key} came with {known} before, and with {size} now: one of the two is wrong, or the machine counts"
@@ -121,4 +130,5 @@ def contradictions(database: sqlite3.Connection, machine: str, received: Sequenc
         told = size if not isinstance(size, list) else hashlib.sha256(json.dumps(size).encode()).hexdigest()[:16]
         row = (machine, f"{each.key}:{told}", json.dumps(each.body), "quarantined", reason[:MOST_REASON], now)
         database.execute(ADD, row)
-    return database.total_changes - before
+        refused[place] = reason[:MOST_REASON]
+    return Added(database.total_changes - before, refused)

@@ -36,8 +36,8 @@ def store(tmp_path: Path) -> Store:
 
 def test_readings_wait_in_their_order_until_they_are_sent(store: Store) -> None:
     async def story() -> None:
-        assert await store.add(M, [received(1), received(2), received(3, "no size")]) == 3
-        assert await store.add(M, [received(2), received(4)]) == 1, "a known key is not stored again"
+        assert (await store.add(M, [received(1), received(2), received(3, "no size")])).new == 3
+        assert (await store.add(M, [received(2), received(4)])).new == 1, "a known key is not stored again"
         assert await store.position(M) == Position(7, 4)
         rows = await store.waiting(M)
         assert [row.key for row in rows] == [f"{M}:7:1", f"{M}:7:2", f"{M}:7:4"]
@@ -58,8 +58,9 @@ def test_another_size_under_a_known_key_is_not_passed_over(store: Store) -> None
     async def story() -> None:
         await store.add(M, [received(1), received(2)])
         other = replace(received(1), body={"characteristic": "c", "measured": 40.5})
-        assert await store.add(M, [other, received(2), received(3)]) == 2
-        assert await store.add(M, [other]) == 0
+        assert (await store.add(M, [other, received(2), received(3)])).new == 2
+        assert (await store.add(M, [other])).new == 0
+        assert list((await store.add(M, [received(2), other])).refused) == [1], "as often as it comes"
         [kept] = await store.quarantine(M)
         assert (kept.key, kept.body["measured"]) == (f"{M}:7:1:40.5", 40.5)
         assert "came with 40.001 before, and with 40.5 now" in kept.reason
@@ -201,7 +202,7 @@ def test_a_store_that_cannot_be_written_says_so(tmp_path: Path) -> None:
     with pytest.raises(StoreError, match="cannot be written"):
         run(locked.add(M, [received(1)]))
     other.execute("ROLLBACK")
-    assert run(locked.add(M, [received(1)])) == 1, "it goes on once it can"
+    assert run(locked.add(M, [received(1)])).new == 1, "it goes on once it can"
 
 
 def test_a_full_disk_is_said_and_what_was_stored_stays(tmp_path: Path) -> None:
@@ -215,7 +216,7 @@ def test_a_full_disk_is_said_and_what_was_stored_stays(tmp_path: Path) -> None:
                 stored += 1
         assert len(await store.waiting(M, 5000)) == stored
         store._database.execute("PRAGMA max_page_count = 100000")
-        assert await store.add(M, [received(stored + 1)]) == 1, "it goes on once there is room"
+        assert (await store.add(M, [received(stored + 1)])).new == 1, "it goes on once there is room"
 
     run(story())
 

@@ -21,7 +21,7 @@ import pyLSV2
 from msgspec import Meta
 
 from app.bridge.configuration import Machine
-from app.bridge.links import Clock, ControlAway, Decided, Misconfigured, Order, Outcome, Position, Received
+from app.bridge.links import Clock, ControlAway, Decided, LinkError, Misconfigured, Order, Outcome, Position, Received
 from app.bridge.moments import Prints
 from app.bridge.plain_files import read_plain, write_new
 from app.bridge.slots import printed_reading
@@ -102,6 +102,9 @@ class Files(Protocol):
 
     def put(self, text: str) -> None:
         """Replace the program of corrections; never half of it."""
+
+    def try_out(self) -> str | None:
+        """Write as `put` does, beside the program; a sentence if that does not go."""
 
     def end(self) -> None:
         """Disconnect at once, also while another thread waits for an answer."""
@@ -259,7 +262,28 @@ class Lsv2Files:
 
     def put(self, text: str) -> None:
         """Replace the program: sent under another name first, so that a half one is never called."""
-        name = self.settings.corrections
+        self._put(text, self.settings.corrections)
+
+    def try_out(self) -> str | None:
+        """The same with a program of another name, that does nothing; it is fetched, and deleted again."""
+        name = str(PureWindowsPath(self.settings.corrections).with_name("corr_chk.h"))
+        try:
+            self._put(correction_program((), {}, "mm", name), name)
+            with tempfile.TemporaryDirectory() as folder:
+                local = Path(folder) / "corr_chk.h"
+                fetched = self._guarded(lambda: self._client.recive_file(name, local), f"fetched {name}")
+                whole = bool(fetched) and b"END PGM CORR_CHK" in local.read_bytes()
+            if not self._guarded(lambda: self._client.delete_file(name), f"deleted {name}"):
+                return self._said(f"{name} could not be deleted") + ". It does nothing; delete it at the control."
+        except LinkError as error:
+            return str(error)
+        return (
+            None
+            if whole
+            else f"{name}, written to the control, did not come back whole. It is tried again by the bridge."
+        )
+
+    def _put(self, text: str, name: str) -> None:
         new = str(PureWindowsPath(name).with_name("corr_new.h"))
         with tempfile.TemporaryDirectory() as folder:
             local = Path(folder) / "corr_new.h"
@@ -435,10 +459,8 @@ class TncLink:
             self._lying = text
 
     async def try_out(self) -> list[str]:
-        """Write into the folder, where corrections go there."""
-        if self.machine.corrections == "none" or not isinstance(self._files, FolderFiles):
-            return []
-        wrong = await asyncio.to_thread(self._files.try_out)
+        """Write a program beside that of the corrections, as one of these is written, and take it away."""
+        wrong = await asyncio.to_thread(self._open_files().try_out)
         return [wrong] if wrong else []
 
     async def outcomes(self) -> Sequence[Outcome]:

@@ -41,6 +41,7 @@ AT_LEAST_ONCE: Final = 1
 REFUSED: Final = 0x80  # from here on a reason of MQTT is a failure
 BAD_LOGIN, NOT_ALLOWED, TAKEN_OVER = 0x86, 0x87, 0x8E
 GOODBYE: Final = 3.0  # s
+ECHO: Final = 5.0  # s until what was published comes back
 OTHERS_TURN: Final = 15.0  # s that a client stays away after another one has taken its id
 
 
@@ -130,6 +131,7 @@ class MqttLink:
         self._offsets: dict[int, float] = {}
         self._offered: tuple[Sequence[Order], float] | None = None
         self._taken_over = -OTHERS_TURN
+        self._echo: tuple[str, bytes, asyncio.Event] | None = None
 
     # --- connection
 
@@ -191,6 +193,10 @@ class MqttLink:
                 self._readings.append(message)
             elif topic == f"{self.base}/applied":
                 self._answers.append(message)
+            elif topic != f"{self.base}/offsets":  # of `try_out`
+                if self._echo is not None and topic == self._echo[0] and bytes(message.payload) == self._echo[1]:
+                    self._echo[2].set()
+                self._done(message)
             else:
                 self._take_offsets(message)
                 self._done(message)
@@ -431,6 +437,37 @@ class MqttLink:
                 for each in decided
             )
         )
+
+    async def try_out(self) -> list[str]:
+        """Publish all that the bridge will publish, with words that ask for nothing, and see it come back where the broker lets it."""
+        nothing = {"key": f"{self.machine.key}:check"}
+        contents: dict[str, dict[str, Any]] = {
+            "stored": nothing,
+            "decisions": nothing | {"characteristic": "", "action": "none", "reason": "check"},
+        }
+        if self.machine.corrections != "none":
+            contents["corrections"] = {"corrections": []}  # as the bridge itself begins
+        wrong = [await self._tried(topic, content) for topic, content in contents.items()]
+        return [words for words in wrong if words]
+
+    async def _tried(self, topic: str, content: Mapping[str, Any]) -> str:
+        """The words of what went wrong; empty if nothing did."""
+        client, name = self._there(), f"{self.base}/{topic}"
+        client.refused = ""
+        [reason, *_] = await client.subscribe(name, qos=AT_LEAST_ONCE)
+        self._echo = (name, json.dumps(content).encode(), asyncio.Event())
+        try:
+            await self._publish(topic, content, retain=topic == "corrections")
+            if getattr(reason, "value", reason) < REFUSED:
+                await asyncio.wait_for(self._echo[2].wait(), ECHO)
+        except TimeoutError:
+            return f"The broker {self.where} took a message on {name} and did not hand it on: look at its rights and its log."
+        except Misconfigured as error:
+            return str(error)
+        finally:
+            self._echo = None
+            await client.unsubscribe(name)
+        return ""
 
     # --- offsets
 

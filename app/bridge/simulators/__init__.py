@@ -16,6 +16,7 @@ SIMULATORS: Final[dict[str, str]] = {
     "mtconnect": "app.bridge.simulators.mtconnect",
     "mqtt": "app.bridge.simulators.mqtt",
     "opcua": "app.bridge.simulators.opcua",
+    "text": "app.bridge.simulators.text",
 }
 """Kinds that can be simulated, and the module of each."""
 

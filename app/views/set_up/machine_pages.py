@@ -55,6 +55,15 @@ def types() -> list[tuple[str, str]]:
     ]
 
 
+def stopping() -> str:
+    """The sentence about the ways on which `stop` and `hold` reach a machine, and those on which they do not."""
+    return _(
+        "Stops reach a machine that speaks REST, and by a bridge of kind opcua, haas, heidenhain or mqtt, or folder with a file of "
+        "decisions. A bridge of kind dprnt or text, or folder without that file, cannot stop it: a stop is an alarm there, and "
+        "nothing more."
+    )
+
+
 def signal_paths() -> list[tuple[str, str]]:
     return [("direct", _("Direct to the control")), ("plc", _("Through the PLC"))]
 
@@ -115,6 +124,7 @@ def _new(
         typed=typed,
         errors=errors,
         controls=controls(),
+        stopping=stopping(),
         types=types(),
         most_locations=MOST_LOCATIONS,
     )
@@ -223,6 +233,7 @@ def _machine(
         typed=typed or {name: _shown(getattr(machine, name)) for name in SHOWN},
         errors=errors or {},
         controls=controls(),
+        stopping=stopping(),
         types=types(),
         most_locations=MOST_LOCATIONS,
         signal_paths=signal_paths(),

@@ -310,6 +310,25 @@ def test_mistakes_are_said(tmp_path: Path) -> None:
     run(work())
 
 
+def test_the_check_writes_a_program_as_that_of_the_corrections_and_takes_it_away() -> None:
+    async def work() -> None:
+        async with control() as simulator:
+            simulator.files["TNC:\\inband\\corr.h"] = b"0 BEGIN PGM CORR MM"
+            before = dict(simulator.files)
+            link = TncLink(tnc(settings(simulator)))
+            await link.connect()
+            assert await link.try_out() == []
+            assert simulator.files == before
+            await link.close()
+            other = TncLink(tnc(settings(simulator, corrections="TNC:\\no\\corr.h")))
+            await other.connect()
+            [wrong] = await other.try_out()
+            assert "Make the directory" in wrong
+            await other.close()
+
+    run(work())
+
+
 def test_the_configuration_needs_an_address_or_a_folder(tmp_path: Path) -> None:
     table = {"kind": "heidenhain", "unit": "mm", "secret": "s", "corrections": "none"}
     with pytest.raises(ConfigurationError, match="needs one of address and folder"):

@@ -206,6 +206,31 @@ def test_what_the_server_refuses_later_is_told_the_machine(tmp_path: Path) -> No
     run(work())
 
 
+def test_a_key_that_lies_in_the_quarantine_is_refused_however_often_it_comes(tmp_path: Path) -> None:
+    """Whether the bridge found it wrong, a second size under a key, or the server did and the machine has not heard of it."""
+
+    async def work() -> None:
+        store = store_in(tmp_path / "store")
+        async with Broker(tmp_path) as broker, fetching(machine(broker.port), store) as unit:
+            await until(lambda: unit.state == "online", "the bridge is connected")
+            async with aiomqtt.Client("127.0.0.1", broker.port) as client:
+                await client.subscribe(f"{TOPIC}/stored", qos=1)
+                await say(broker.port, "readings", READING | {"key": "a"}, READING | {"key": "b"})
+                assert [await said(client) for _ in range(2)] == [{"key": "a"}, {"key": "b"}]
+                await say(broker.port, "readings", READING | {"key": "a", "measured": 41.5})
+                answer = await said(client)
+                assert "Key a came with 40.012 before, and with 41.5 now" in answer.pop("refused")
+                assert answer == {"key": "a"}
+                row = next(row for row in await store.waiting("lathe-1") if row.key == "b")
+                await store.refuse("lathe-1", row.id, "There is no characteristic 'shaft-1'.")
+                await say(broker.port, "readings", READING | {"key": "b"}, READING | {"key": "a"})
+                assert await said(client) == {"key": "b", "refused": "There is no characteristic 'shaft-1'."}
+                assert await said(client) == {"key": "a"}
+        store.close()
+
+    run(work())
+
+
 async def said(client: aiomqtt.Client) -> Any:
     async with asyncio.timeout(PATIENCE):
         return json.loads(bytes((await anext(aiter(client.messages))).payload))
@@ -341,6 +366,28 @@ def test_a_broker_that_lets_the_bridge_not_write_is_told(tmp_path: Path) -> None
         ):
             with pytest.raises(Misconfigured, match=r"does not let the bridge write .*/corrections: Not authorized"):
                 await there.offer([])
+
+    run(work())
+
+
+def test_the_check_publishes_what_the_bridge_will_publish(tmp_path: Path) -> None:
+    """A bridge that may read and not write what it answers would else be found out at the first part."""
+
+    async def work() -> None:
+        rights = tmp_path / "rights"
+        rights.write_text("topic readwrite inband/v1/lathe-1/stored\ntopic read inband/v1/#\n", encoding="utf-8")
+        async with (
+            Broker(tmp_path, "allow_anonymous true", f"acl_file {rights}") as broker,
+            connected(machine(broker.port)) as there,
+        ):
+            wrong = await there.try_out()
+            assert [
+                f"write {TOPIC}/{topic}: Not authorized" in words
+                for topic, words in zip(("decisions", "corrections"), wrong, strict=True)
+            ] == [True, True]
+        async with Broker(tmp_path) as broker, connected(machine(broker.port)) as there:
+            assert await there.try_out() == []
+            assert await there.offsets() == {}
 
     run(work())
 

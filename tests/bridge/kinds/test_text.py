@@ -4,6 +4,7 @@ import asyncio
 import os
 import pty
 import time
+import tomllib
 import tty
 from collections.abc import Sequence
 from contextlib import AbstractAsyncContextManager
@@ -16,10 +17,13 @@ from app.bridge.configuration import ConfigurationError, Machine, configuration_
 from app.bridge.kinds.text import TextLines, TextLink
 from app.bridge.links import Misconfigured, Position, Received
 from app.bridge.patterns import Patterns, TooSlow
+from app.bridge.simulators import simulator_named
+from app.bridge.simulators.model import Feature, Model
 from app.bridge.sources import Source
 from app.bridge.store import Store
 from app.bridge.unit import Unit
-from tests.bridge.plant import controlled, store_in, until
+from app.cli.bridge import toml_of
+from tests.bridge.plant import controlled, parts, store_in, until
 from tests.loops import run
 
 LINES = (r"^PART +(?P<part>\S+)", r"(?P<characteristic>D\d+) +ACTUAL +(?P<measured>[-\d.]+)")
@@ -173,6 +177,30 @@ def test_readings_come_by_tcp_and_from_a_serial_port(tmp_path: Path) -> None:
             await stored(store, 2)
         os.close(ours)
         os.close(theirs)
+        store.close()
+
+    run(work())
+
+
+def test_the_simulated_machine_prints_what_its_table_finds(tmp_path: Path) -> None:
+    """The table goes into a configuration as it is printed; each reading has the size that was measured, and its part."""
+
+    async def work() -> None:
+        model, store = Model(tuple(Feature(number) for number in (1, 2))), store_in(tmp_path)
+        simulator = await simulator_named("text").serve(model)
+        table = toml_of("gauge-1", simulator.table()).replace('secret_file = "machine.key"', 'secret = "x"')
+        content = {"server": {"url": "http://127.0.0.1:1"}, **tomllib.loads(table)}
+        [chosen] = configuration_from(content, tmp_path).machines
+        async with fetching(chosen, store):
+            await until(lambda: simulator.connections, "the bridge is connected")
+            await parts(model, 3)
+            await stored(store, 6)
+        rows = [row.body for row in await store.waiting("gauge-1")]
+        assert [(row["characteristic"], row["part"]) for row in rows] == [
+            (f"characteristic-{number}", f"00000{part}") for part in (1, 2, 3) for number in (1, 2)
+        ]
+        assert [row["measured"] for row in rows] == list(model.truth().values())
+        await simulator.stop()
         store.close()
 
     run(work())

@@ -2,12 +2,15 @@
 
 import re
 from html import unescape
+from typing import get_type_hints
 
 import httpx
 import pytest
 
+from app.bridge.kinds import KINDS, kind_named
 from app.loop.characteristics import actions as characteristics
 from app.loop.characteristics.schemas import CharacteristicIn
+from app.views.set_up.machine_pages import stopping
 from tests.conftest import Server
 from tests.shop import PARAMETERS, Person, Shop, unique
 
@@ -86,6 +89,17 @@ class TestMachines:
         )
         assert answer.status_code == 201
         assert answer.json()["zone"] == "zero"
+
+    def test_the_forms_say_which_bridges_cannot_stop_a_machine_before_it_is_saved(
+        self, engineer: Person, shop: Shop
+    ) -> None:
+        for form in ("new", shop.machine):
+            assert stopping() in unescape(engineer.open(f"/setup/machines/{form}"))
+        can, cannot = stopping().split(". A bridge of kind ")
+        for kind in KINDS:
+            carries = hasattr(get_type_hints(kind_named(kind).link)["return"], "decide")
+            assert carries == bool(re.search(rf"\b{kind}\b", can)), kind
+            assert (not carries or kind == "folder") == bool(re.search(rf"\b{kind}\b", cannot)), kind
 
     def test_what_was_typed_is_not_lost(self, engineer: Person) -> None:
         page = engineer.post("/setup/machines/new", 422, key="Bad Key", name=SERBIAN, control="fanuc").text
