@@ -17,6 +17,7 @@ from app.bridge.simulators.model import Model
 from app.bridge.slots import reading_of
 from app.bridge.store import Store
 from app.bridge.store_lock import StoreError
+from app.bridge.store_tables import Added
 from app.core.ring import Slot
 from tests.bridge.plant import machine
 from tests.loops import run
@@ -181,9 +182,8 @@ def test_one_call_that_fails_takes_no_other_along(store: Store) -> None:
             store.add("another", [received(1)]),
             return_exceptions=True,
         )
-        assert together[0] == 1
+        assert together[0] == together[3] == Added(1, {})
         assert isinstance(together[2], StoreError)
-        assert together[3] == 1
 
     run(story())
 
