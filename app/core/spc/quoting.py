@@ -61,7 +61,7 @@ class Quoting(NamedTuple):
     why: str | None = None
 
 
-RULE = 1
+RULE = 2
 """Number of the rule by which an index may be quoted: one more with every change of it, so that kept indices are judged again."""
 FORBID_CPK = frozenset({Caution.NOT_IN_CONTROL, Caution.FEW_READINGS, Caution.COARSE})
 """Cautions beside which Cpk is not quoted: each says that the scatter from part to part is not known well enough."""
@@ -88,7 +88,7 @@ def quoting(
         if isinstance(by_percentile, Refused):
             return Quoting(Quote.NONE, why=WhyNot.NO_SHAPE.value)
         preliminary = few or Caution.FEW_FOR_PERCENTILES in by_percentile.cautions
-        return Quoting(Quote.PERCENTILE, by_percentile.ppk, preliminary=preliminary)
+        return _of(Quote.PERCENTILE, by_percentile.ppk, preliminary)
     if stable is True and not FORBID_CPK & set(indices.cautions):
         return _of(Quote.CPK, indices.cpk, few)
     return _of(Quote.PPK, indices.ppk, few)

@@ -18,7 +18,7 @@ def interval(found: Index, *, allowed: bool = True) -> Markup:
 
     lines = "".join(f'<path class="mark" d="M{x(mark):.1f} 3V{HEIGHT - 3:g}"/>' for mark in MARKS)
     low, high = (
-        found.low if found.low is not None else found.value,
+        found.low if found.low is not None else 0.0,  # no reading bounds it from below
         found.high if found.high is not None else found.value,
     )
     label = _("{value}, interval {between}").format(value=index(found.value), between=between(found))

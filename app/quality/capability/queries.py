@@ -251,7 +251,7 @@ def _judged(
         "versions": versions,
         "compensated": compensated,
         "indices": or_refused(lambda: capability(values, limits, confidence=confidence, cautions=cautions)),
-        "by_percentile": or_refused(lambda: percentile(values, limits, minimum=ENOUGH_READINGS)),
+        "by_percentile": or_refused(lambda: percentile(values, limits, confidence=confidence, minimum=ENOUGH_READINGS)),
         "stability": control_verdict,
         "baseline": baseline,
         "in_time": or_refused(lambda: in_time.in_time(values)),

@@ -70,6 +70,7 @@ def study_of(session: Session, current: CurrentCharacteristic, choice: StudyRequ
         last=None if last == "all" else min(int(last), LARGEST_ID),
         start=choice.start,
         end=choice.end,
+        usable=True,
     )
     return queries.capability_of(
         session,

@@ -5,7 +5,7 @@ from typing import Any, Literal
 
 from pydantic import BaseModel, Field
 
-from app.core.spc.capability import Fallout, Index
+from app.core.spc.capability import Fallout, Index, PercentileCapability
 from app.core.spc.in_time import InTime
 from app.core.spc.normality import Normality
 from app.core.spc.refusal import Refused
@@ -21,7 +21,9 @@ class IndexOut(BaseModel):
     value: float
     low: float | None
     high: float | None
-    method: str | None = Field(description="Of the interval: `chi_square`, `bissell`, `noncentral_t`, `boyles`.")
+    method: str | None = Field(
+        description="Of the interval: `chi_square`, `bissell`, `noncentral_t`, `boyles`, `order_statistics`."
+    )
 
     @classmethod
     def of(cls, found: Index | None) -> "IndexOut | None":
@@ -65,7 +67,9 @@ class QuotedOut(BaseModel):
 
     index: Literal["cpk", "ppk", "percentile"]
     value: float
-    low: float | None = Field(description="Of the interval; null by percentiles.")
+    low: float | None = Field(
+        description="Of the interval; null by percentiles of fewer than 2731 readings: none bounds them."
+    )
     high: float | None
     preliminary: bool = Field(description="Fewer than 100 readings, or than 1000 by percentiles.")
     method: str
@@ -80,6 +84,9 @@ class PercentileOut(BaseModel):
     high: float = Field(description="X99.865 %")
     pp: float | None
     ppk: float
+    interval: IndexOut = Field(
+        description="Of Ppk, by order statistics; its low end is null below 2731 readings, at 95 %: none bounds the percentile."
+    )
 
 
 class TestOut(BaseModel):
@@ -227,7 +234,7 @@ def capability_out(study: Study) -> CapabilityOut:
         pp=IndexOut.of(result.pp if result else None),
         ppk=IndexOut.of(result.ppk if result else None),
         cpm=IndexOut.of(result.cpm if result else None),
-        percentiles=answer_from(PercentileOut, by_percentile) if by_percentile else None,
+        percentiles=_percentiles(by_percentile) if by_percentile else None,
         ppm_within=FalloutOut.of(study.within),
         ppm_overall=FalloutOut.of(study.overall),
         ppm_observed=FalloutOut.of(study.fallout),
@@ -249,6 +256,10 @@ def capability_out(study: Study) -> CapabilityOut:
 
 def _fields(given: Any) -> dict[str, Any]:
     return {name: getattr(given, name) for name in given.__slots__}
+
+
+def _percentiles(found: PercentileCapability) -> PercentileOut:
+    return answer_from(PercentileOut, found, ppk=found.ppk.value, interval=IndexOut.of(found.ppk))
 
 
 def _quoted(study: Study) -> QuotedOut | None:

@@ -120,7 +120,7 @@ def verdicts_of(
     readings before.
     """
     current = characteristic_named(session, state.key)
-    window = statistics.window_of(session, current.characteristic, last=USUAL)
+    window = statistics.window_of(session, current.characteristic, last=USUAL, usable=True)
     judgement = judgement_of(session, current, window)
     row = _row(judgement, state)
     if row.quotable:

@@ -3,7 +3,7 @@
 from app.core.spc.capability import Caution, Index
 from app.core.spc.in_time import ALPHA, InTime, Location, Model, Test
 from app.core.spc.normality import Normality
-from app.core.spc.quoting import WhyNot
+from app.core.spc.quoting import Quoting, WhyNot
 from app.core.spc.refusal import Reason, Refused
 from app.core.spc.stability import Fired, Stability
 from app.language.i18n import _, ngettext
@@ -82,10 +82,12 @@ def index(value: float | None) -> str:
     return fixed(value, 2)
 
 
-def between(found: Index | None) -> str:
+def between(found: Index | Quoting | None) -> str:
     """Its interval."""
-    if found is None or found.low is None or found.high is None:
+    if found is None or found.high is None:
         return "–"
+    if found.low is None:
+        return _("up to {high}").format(high=index(found.high))
     return _("{low} to {high}").format(low=index(found.low), high=index(found.high))
 
 

@@ -9,7 +9,16 @@ from app.core.decision.step import Action, average_of
 from app.core.fits import fit_of
 from app.core.parameters import mean_nominal, read
 from app.core.spc import chance, constants, cusum, ewma, shewhart
-from app.core.spc.capability import Limits, capability, of_percentiles, percentile, ppk_of, spread_index, target_index
+from app.core.spc.capability import (
+    Limits,
+    capability,
+    of_percentiles,
+    order_statistics,
+    percentile,
+    ppk_of,
+    spread_index,
+    target_index,
+)
 from app.core.spc.in_time import brown_forsythe, decompose, successive
 from app.core.spc.normality import anderson_darling, p_of, shapiro_wilk
 from app.core.spc.rules import RULES, Rule, RuleName, signals, signals_of_cusum
@@ -223,7 +232,14 @@ def freedom(given: Given) -> Got:
 
 def by_percentile(given: Given) -> Got:
     result = percentile(readings_of(given), Limits(given["lower"], given["upper"]))
-    return {"low": result.low, "median": result.median, "high": result.high, "pp": result.pp, "ppk": result.ppk}
+    return {"low": result.low, "median": result.median, "high": result.high, "pp": result.pp, "ppk": result.ppk.value}
+
+
+def places(given: Given) -> Got:
+    """Ordered readings, counted from 1, that bound a quantile; 0 where none does."""
+    found = [order_statistics(given["share"], n, given["confidence"]) for n in given["readings"]]
+    outer, inner = ([0 if place is None else place + 1 for place in side] for side in zip(*found, strict=True))
+    return {"outer": outer, "inner": inner}
 
 
 def indices_of_percentiles(given: Given) -> Got:
@@ -287,6 +303,7 @@ ENGINE: dict[str, Callable[[Given], Got]] = {
     "intervals": intervals,
     "one_sided_bounds": one_sided_bounds,
     "percentile": by_percentile,
+    "order_statistics": places,
     "percentile_indices": indices_of_percentiles,
     "anderson_darling": anderson,
     "anderson_p": anderson_p,

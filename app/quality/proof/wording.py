@@ -40,6 +40,7 @@ def topics() -> dict[str, tuple[str, tuple[str, ...]]]:
                 "one_sided_bounds",
                 "percentile",
                 "percentile_indices",
+                "order_statistics",
                 "anderson_darling",
                 "anderson_p",
                 "shapiro_wilk",

@@ -126,7 +126,9 @@ def test_percentiles_do_not_know_unit_sign_or_zero(values: list[int], shift: int
     except Refused:
         return
     after = percentile(shift + scale * x, Limits(*limits), minimum=20)
-    assert (after.pp, after.ppk) == pytest.approx((before.pp, before.ppk), rel=1e-6)
+    assert (after.pp, after.ppk.value) == pytest.approx((before.pp, before.ppk.value), rel=1e-6)
+    assert after.ppk.low == before.ppk.low
+    assert after.ppk.high == pytest.approx(before.ppk.high, rel=1e-6)
 
 
 @given(values=READINGS, scale=st.sampled_from([-7.0, 0.001, 2.0]))
@@ -245,14 +247,33 @@ class TestPercentiles:
     def test_of_normal_readings_they_agree_with_the_indices(self) -> None:
         values = np.random.default_rng(9).normal(10, 2, size=400_000)
         by_percentile = percentile(values, Limits(0, 22))
-        assert by_percentile.ppk == pytest.approx(capability(values, Limits(0, 22)).ppk.value, rel=0.02)
+        assert by_percentile.ppk.value == pytest.approx(capability(values, Limits(0, 22)).ppk.value, rel=0.02)
         assert by_percentile.cautions == ()
 
     def test_of_a_skewed_process_they_tell_what_happens(self) -> None:
         values = np.random.default_rng(9).exponential(size=100_000)
         found = percentile(values, Limits(None, 6.6077))  # the true 99.865 % point
-        assert found.ppk == pytest.approx(1.0, abs=0.03)
+        assert found.ppk.value == pytest.approx(1.0, abs=0.03)
         assert found.pp is None
+
+    @pytest.mark.parametrize("count", [300, 1000, 4000])
+    def test_the_interval_holds_the_truth_as_often_as_it_says(self, count: int) -> None:
+        rng, held, bounded = np.random.default_rng(21), 0, 0
+        truth = (9 - np.log(2)) / (-np.log(0.00135) - np.log(2))
+        for _ in range(400):
+            index = percentile(rng.exponential(size=count), Limits(None, 9.0)).ppk
+            assert index.high is not None
+            held += (index.low or 0.0) <= truth <= index.high
+            bounded += index.low is not None
+        assert held / 400 >= 0.94
+        assert bounded == (400 if count >= 2731 else 0)
+
+    def test_an_open_end_is_none_and_beyond_the_limit_it_is_the_other_one(self) -> None:
+        values = np.random.default_rng(21).exponential(size=500)
+        good, bad = (percentile(values, Limits(None, limit)).ppk for limit in (9.0, 0.3))
+        assert good.low is None
+        assert bad.low is not None
+        assert bad.low < bad.value < 0.0 == bad.high
 
     def test_of_few_readings_they_say_so_or_are_refused(self) -> None:
         values = np.random.default_rng(9).normal(size=999)

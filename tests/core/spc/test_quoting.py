@@ -101,6 +101,7 @@ def test_the_quote_never_contradicts_a_caution(
         assert Caution.NOT_NORMAL not in found.cautions
     if quote.quote is Quote.PERCENTILE:
         assert Caution.NOT_NORMAL in found.cautions
+        assert (quote.value, quote.high) == (by_percentile.ppk.value, by_percentile.ppk.high)
         assert quote.preliminary == bool(by_percentile.cautions or Caution.FEW_READINGS in found.cautions)
     assert not (far and quote.quote is not Quote.NONE)
     assert Caution.FEW_READINGS not in found.cautions or quote.preliminary or quote.quote is Quote.NONE

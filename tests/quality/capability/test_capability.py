@@ -77,6 +77,26 @@ def test_what_is_not_normal_says_whether_percentiles_carry_it(viewer: Person, sh
     assert page.count("hardly more than the smallest") == 1
 
 
+def test_an_excluded_reading_or_a_probe_fault_makes_no_index_preliminary(shop: Shop) -> None:
+    """The window is of the last 1000 that count: a label does not turn because somebody excluded one reading."""
+    key = shop.another("kept", mode="measure_only", tool_memory=0, wear_limit=0.9)
+    shop.push([*(value**2 for value in quiet(1008, seed=8)), 1500.0], key)
+    shop.call("POST", f"/readings/{key}/900/exclude", 200, reason="chip under the stylus")
+    found = of(shop, "", key)
+    assert (found["readings"], found["first_sequence"], found["last_sequence"]) == (1000, 8, 1008)
+    assert (found["excluded"], found["probe_faults"]) == ([900], [1009])
+    quoted = found["quoted"]
+    assert (quoted["index"], quoted["preliminary"]) == ("percentile", False)
+    assert found["percentiles"]["interval"] == {
+        "value": quoted["value"], "low": None, "high": quoted["high"], "method": "order_statistics"
+    }  # fmt: skip
+    report = shop.call("GET", f"/characteristics/{key}/report.json?section=capability")["sections"][0]
+    assert next(fact for fact in report["facts"] if fact["key"] == "readings")["value"] == 1000
+    assert f"interval up to {quoted['high']:.2f}" in " ".join(
+        shop.admin.get(f"/characteristics/{key}/capability").text.split()
+    )
+
+
 def test_a_number_of_readings_that_is_none_is_told_in_words(shop: Shop) -> None:
     problem = of(shop, "last=0", status=422)
     assert problem["detail"] == "last: must be a number of readings from 1 on, such as 500, or one of: all"

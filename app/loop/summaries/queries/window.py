@@ -5,12 +5,16 @@ from datetime import UTC, datetime
 
 import numpy as np
 from numpy.typing import NDArray
-from sqlalchemy import ColumnElement, and_, func, select, true
+from sqlalchemy import ColumnElement, and_, exists, func, select, true
 from sqlalchemy.orm import Session
 
+from app.core.decision.limits import Zone
 from app.loop.summaries.queries.pyramid import Run, cover_of
 from app.loop.tables.characteristics import Characteristic
-from app.loop.tables.readings import Reading, Stream
+from app.loop.tables.readings import Exclusion, Reading, Stream
+
+MOST_COUNTED = 100_000
+"""Of more readings, a few that are left out make no difference."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -85,12 +89,17 @@ def window_of(
     through: int | None = None,
     start: datetime | None = None,
     end: datetime | None = None,
+    usable: bool = False,
 ) -> Window:
-    """The readings first … through; of them the `last` so many; of them those measured in start … end."""
+    """The readings first … through; of them the `last` so many; of them those measured in start … end.
+
+    usable: neither excluded readings nor probe faults count for `last`, up to `MOST_COUNTED`, so that an index of the last
+    1000 stays one of 1000 readings when somebody excludes one.
+    """
     newest = newest_of(session, characteristic)
     low, high = max(1, first or 1), min(newest, newest if through is None else through)
     if last is not None:
-        low = max(low, high - last + 1)
+        low = max(low, _last_usable(session, characteristic, low, high, last) if usable else high - last + 1)
     window = Window(low, high, newest)
     if start is None and end is None:
         return window
@@ -99,6 +108,31 @@ def window_of(
     ends = [end for block in cover.blocks for end in (block.first, block.last)]
     ends += _ends_in_time(session, characteristic, cover.runs, window)
     return replace(window, first=min(ends, default=1), last=max(ends, default=0))
+
+
+def _last_usable(session: Session, characteristic: Characteristic, low: int, high: int, last: int) -> int:
+    """The reading that begins the last so many usable ones of low … high."""
+    if not 0 < last <= min(MOST_COUNTED, high - low):
+        return high - last + 1
+    excluded = exists().where(
+        Exclusion.machine_id == Reading.machine_id,
+        Exclusion.characteristic_id == Reading.characteristic_id,
+        Exclusion.sequence == Reading.sequence,
+    )
+    query = (
+        select(Reading.sequence)
+        .where(
+            Reading.machine_id == characteristic.machine_id,
+            Reading.characteristic_id == characteristic.id,
+            Reading.sequence.between(low, high),
+            Reading.zone != Zone.PROBE_FAULT.value,
+            ~excluded,
+        )
+        .order_by(Reading.sequence.desc())
+        .offset(last - 1)
+        .limit(1)
+    )
+    return session.scalar(query) or low
 
 
 def _ends_in_time(session: Session, characteristic: Characteristic, runs: list[Run], window: Window) -> list[int]:

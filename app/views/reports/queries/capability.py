@@ -61,8 +61,8 @@ def _indices(study: Study) -> list[Fact]:
     ]
     by_percentile = study.by_percentile
     if not isinstance(by_percentile, Refused):
-        note = "" if study.quote == "percentile" else _("do not report")
-        facts.append(Fact("ppk_percentile", _("Ppk by percentiles"), number(by_percentile.ppk), note=note))
+        index, name = by_percentile.ppk, _("Ppk by percentiles")
+        facts.append(_index("ppk_percentile", name, index, quotable=study.quote == "percentile"))
     return facts
 
 

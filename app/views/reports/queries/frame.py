@@ -50,7 +50,12 @@ class Frame:
         """The readings measured in the period."""
         request = self.request
         return statistics.window_of(
-            self.session, self.current.characteristic, last=request.newest, start=request.start, end=request.end
+            self.session,
+            self.current.characteristic,
+            last=request.newest,
+            start=request.start,
+            end=request.end,
+            usable=True,
         )
 
     @cached_property
