@@ -38,6 +38,7 @@ from app.db.engine import Database
 from tests import chance, one_connection, quick_passwords  # noqa: F401 - the last two replace what they are about
 from tests.db.first_program import make_first_program
 from tests.forked import Forked
+from tests.server_logs import follow, pytest_runtest_makereport, pytest_runtest_setup  # noqa: F401 - hooks of pytest
 from tests.shop import KEY, Person, Shop
 
 for name in [name for name in os.environ if name.startswith(("INBAND_", "PG")) and name != "INBAND_TEST_CITUS"]:
@@ -110,10 +111,10 @@ def shared_dir(tmp_path_factory: pytest.TempPathFactory) -> Path:
 @pytest.fixture(scope="session")
 def postgres(shared_dir: Path) -> Iterator[str]:
     """The server of this run; the URL of a database that no test uses."""
-    server = EmbeddedServer(
-        shared_dir / "inband", {"fsync": "off", "max_connections": "500"}
-    )  # no test pulls the plug; servers of several workers, each with its pool
+    # No test pulls the plug; servers of several workers, each with its pool; who waited for whose lock is in its log.
+    server = EmbeddedServer(shared_dir / "inband", {"fsync": "off", "max_connections": "500", "log_lock_waits": "on"})
     url = server.start()
+    follow(server.log)
     try:
         with (shared_dir / "template.lock").open("w") as lock:
             fcntl.flock(lock, fcntl.LOCK_EX)
@@ -413,6 +414,7 @@ def run_server(new_database: NewDatabase, tmp_path_factory: pytest.TempPathFacto
         url = new_database() if database_url is None else database_url
         stderr, port = tmp_path_factory.mktemp("server") / "stderr", free_port()
         options = {"data_dir": stderr.parent / "data"} | options  # no test may write to a real installation
+        follow(stderr)
         command = ["serve", "--port", str(port), "--database-url", url]
         for option, value in options.items():
             command += [f"--{option.replace('_', '-')}", str(value)]
