@@ -11,6 +11,7 @@
     ├── Invalid            422  the payload; `errors` names each field
     ├── TooManyRequests    429  with Retry-After
     ├── DatabaseAway       503  with Retry-After; nothing was stored
+    │   ├── Busy           503  other work holds what is needed, such as the machine; nothing was stored
     │   └── DiskFull       503  of the server; nothing was stored
     ├── ServerEnding       503  it does not wait for this request any longer
     ├── OutcomeUnknown     503  the database went away during the commit; send again with the same key
@@ -189,6 +190,19 @@ class DatabaseAway(InbandError):
         )
 
 
+class Busy(DatabaseAway):
+    """Other work holds what the request needs, such as its machine, for longer than it can wait; nothing was stored."""
+
+    kind = "busy"
+    title = "Other work holds what is needed"
+
+    def __init__(self, machine: str | None = None) -> None:
+        held = "what this request needs" if machine is None else f"the machine {machine}"
+        super().__init__(
+            f"Other work has held {held} for longer than the request can wait. Nothing of this request was stored."
+        )
+
+
 class DiskFull(DatabaseAway):
     """The disk of the server, or of its database, is full; nothing was stored."""
 
@@ -228,7 +242,8 @@ class OutcomeUnknown(InbandError):
 
     def __init__(self, what_to_do: str | None = None) -> None:
         super().__init__(
-            "The database went away while this was being committed, and has not come back to say whether it was.",
+            "The connection to the database was lost while this was being committed, and in time nobody could be asked "
+            "whether it was.",
             what_to_do
             or "Send it again with the same key: if it was stored you get its answer, if not it is stored now.",
             retry_after=2,

@@ -20,7 +20,7 @@ Answer = TypeVar("Answer")
 FIRST_PAUSE, LONGEST_PAUSE = 0.2, 10.0  # s; doubled after each attempt
 LONGEST_ASKED = 300.0  # s, of Retry-After: more is a proxy's mistake
 NOT_SENT = (httpx.ConnectError, httpx.ConnectTimeout, httpx.PoolTimeout, httpx.ProxyError)
-NOTHING_STORED = {"database-away", "disk-full", "too-many-requests"}
+NOTHING_STORED = {"busy", "database-away", "disk-full", "too-many-requests"}
 LONGEST_QUOTE = 200
 
 

@@ -13,6 +13,11 @@ from app.db.pipeline import Pipeline
 from app.loop.readings.writer.transaction import ROLLBACK
 
 LONGEST = 60.0  # s that a batch may take, as long as the database is heard; a single reading has only the patience
+GIVE_WAY = 0.1  # s that readings of several machines wait for one that other work holds
+HELD = 0.7  # of the patience: as long do the readings of that machine wait for it, alone
+STATEMENT = (
+    0.8  # of the patience: no statement of single readings takes longer, so a wait has ended before nobody listens
+)
 LAST_ATTEMPT = 0.2  # of the patience, for the one attempt of whoever comes when it has run out
 
 # Every statement of the writer finds its rows by an index, however small the tables are when it is first planned; planned
@@ -23,10 +28,10 @@ PLANNER = "-c plan_cache_mode=force_generic_plan -c enable_seqscan=off -c enable
 PLANNER_OF_CITUS = "SET plan_cache_mode = force_custom_plan"
 
 
-async def connect(database: Database) -> Pipeline:
+async def connect(database: Database, limits: str = LIMITS) -> Pipeline:
     """Open a connection for readings: statements prepared at their first use, transactions by our own word."""
     connections = database.connections
-    connection = await connections.connect_async(options=f"{LIMITS} {PLANNER}", application_name="inband-readings")
+    connection = await connections.connect_async(options=f"{limits} {PLANNER}", application_name="inband-readings")
     distributed = await (await connection.execute(CITUS)).fetchone() is not None
     if distributed:
         await connection.execute(PLANNER_OF_CITUS)
@@ -34,11 +39,17 @@ async def connect(database: Database) -> Pipeline:
 
 
 class WriterConnection:
-    """One connection at a time, and since when there has been none that works."""
+    """One connection at a time, and since when there has been none that works.
 
-    def __init__(self, database: Database) -> None:
+    lock_wait: seconds until PostgreSQL ends a transaction that waits for a lock, so that nothing of it is stored; clearly less
+    than the patience. None: of batches, which are waited for longer than any lock.
+    """
+
+    def __init__(self, database: Database, lock_wait: float | None = None) -> None:
         self.database = database
         self.patience = database.connections.patience
+        self.lock_wait = lock_wait
+        self._waits = lock_wait
         self.pipeline: Pipeline | None = None
         self._away_since: float | None = None
 
@@ -49,8 +60,18 @@ class WriterConnection:
 
     async def open(self) -> Pipeline:
         """Open a connection in the place of the one before. Raises psycopg's `OperationalError`."""
-        self.pipeline = await connect(self.database)
+        limits = LIMITS
+        if self.lock_wait is not None:
+            limits += f" -c lock_timeout={_ms(self.lock_wait)} -c statement_timeout={_ms(self.patience * STATEMENT)}"
+        self.pipeline = await connect(self.database, limits)
+        self._waits = self.lock_wait
         return self.pipeline
+
+    async def wait_for_locks(self, seconds: float | None) -> None:
+        """Wait so long for each lock from now on. Raises psycopg's errors."""
+        if self._waits != seconds and seconds is not None and self.pipeline is not None:
+            await self.pipeline.run((("SELECT set_config('lock_timeout', $1, false)", _ms(seconds)),))
+            self._waits = seconds
 
     async def close(self) -> None:
         """Give the connection back."""
@@ -95,17 +116,24 @@ class WriterConnection:
         return 0.0 if self._away_since is None else monotonic() - self._away_since
 
 
+def _ms(seconds: float) -> str:
+    return str(round(seconds * 1000))
+
+
 class Attempts:
-    """Pauses between attempts, each twice as long as the one before, until the deadline or until the database is silent."""
+    """Pauses between attempts, each twice as long as the one before, until the deadline."""
 
     def __init__(self, connection: WriterConnection, deadline: float) -> None:
         self.deadline = deadline
-        self._silent = connection.database.connections
+        self._connections = connection.database.connections
         self._pause = 0.02
 
-    async def another(self) -> bool:
-        """Wait for the next attempt; False, at once, if there is no time for one."""
-        if monotonic() + self._pause > self.deadline or self._silent.silent:
+    async def another(self, *, silent: bool = False) -> bool:
+        """Wait for the next attempt; False, at once, if there is no time for one.
+
+        silent: also where the database counts as silent, which it may not until the deadline.
+        """
+        if monotonic() + self._pause > self.deadline or (self._connections.silent and not silent):
             return False
         await asyncio.sleep(self._pause)
         self._pause = min(2 * self._pause, 0.5)

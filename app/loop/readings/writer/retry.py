@@ -1,28 +1,31 @@
 """Store readings, and do it again when the connection breaks or the snapshot was not true any more.
 
 When the connection breaks after the commit was sent, the database is asked if the readings are there, so that none is lost
-or stored twice.
+or stored twice. A lock that other work holds is not an absent database: PostgreSQL itself ends the wait for it, before
+anybody's patience does, and nothing was stored.
 """
 
 import asyncio
 import logging
 from collections.abc import Sequence
+from contextlib import suppress
 from time import monotonic
 
 import psycopg
 
+from app.db.connections import LOOK
 from app.db.engine import Database
 from app.db.pipeline import Pipeline
-from app.errors import DatabaseAway, DiskFull, InbandError, OutcomeUnknown
+from app.errors import Busy, DatabaseAway, DiskFull, InbandError, OutcomeUnknown
 from app.language.i18n import _
 from app.loop.readings.records import Entry
 from app.loop.readings.schemas import ReadingIn
 from app.loop.readings.writer.columnar import ColumnarReadings, Outcome
-from app.loop.readings.writer.connection import LAST_ATTEMPT, LONGEST, Attempts, WriterConnection
+from app.loop.readings.writer.connection import HELD, LAST_ATTEMPT, LONGEST, Attempts, WriterConnection
 from app.loop.readings.writer.load import ParametersCache
 from app.loop.readings.writer.pending import Verdict
 from app.loop.readings.writer.snapshot import Snapshot
-from app.loop.readings.writer.statements import NOTIFY
+from app.loop.readings.writer.statements import FREE, NOTIFY, array
 from app.loop.readings.writer.transaction import STALE, CommitLost, new_verdicts, transact
 
 log = logging.getLogger(__name__)
@@ -31,11 +34,34 @@ PESSIMISTIC_FOR = 16  # transactions that load what they need, after one whose s
 NOTIFY_EVERY = 0.05  # s; waking everybody costs as much as a commit, and pages look ten times a second at most
 
 
-class ReadingStore:
-    """Stores readings over one connection, with the snapshot of the transaction before."""
+HELD_UP = (psycopg.errors.LockNotAvailable, psycopg.errors.QueryCanceled)
+"""PostgreSQL has ended the transaction because it waited for too long; nothing of it is stored."""
 
-    def __init__(self, database: Database, parameters: ParametersCache) -> None:
-        self.connection = WriterConnection(database)
+
+class MachinesHeld(Exception):
+    """Nothing was stored, because other work holds these machines."""
+
+    def __init__(self, machine_ids: set[int]) -> None:
+        super().__init__(machine_ids)
+        self.machine_ids = machine_ids
+
+
+class ReadingStore:
+    """Stores readings over one connection, with the snapshot of the transaction before.
+
+    lock_wait: as of `WriterConnection`. gives_way: raise `MachinesHeld` after that, so that others need not wait.
+    """
+
+    def __init__(
+        self,
+        database: Database,
+        parameters: ParametersCache,
+        *,
+        lock_wait: float | None = None,
+        gives_way: bool = False,
+    ) -> None:
+        self.connection = WriterConnection(database, lock_wait)
+        self.gives_way = gives_way
         self.parameters = parameters
         self._snapshot = Snapshot()
         self._pessimistic_for = 0
@@ -49,14 +75,16 @@ class ReadingStore:
     async def store(
         self, readings: Sequence[tuple[Entry, ReadingIn]], *, all_or_nothing: bool = False
     ) -> list[Outcome]:
-        """Return the outcome of each reading, after the commit. Raises only when it is all or nothing."""
+        """Return the outcome of each reading, after the commit. Raises only when it is all or nothing, or `MachinesHeld`."""
         # Whoever comes while the database has been away for long is not kept waiting once more.
         attempts = Attempts(self.connection, self.connection.deadline())
         optimistic = not self._pessimistic_for
+        lock_wait: float | None = self.connection.lock_wait
         notify = all_or_nothing or monotonic() > self._notified_at + NOTIFY_EVERY
         while True:
             try:
                 pipeline = await self._ready(attempts.deadline, all_or_nothing=all_or_nothing)
+                await self.connection.wait_for_locks(lock_wait)
                 outcomes = await transact(
                     pipeline,
                     self.parameters,
@@ -71,6 +99,14 @@ class ReadingStore:
                 self.connection.is_away()
                 if (outcomes_now := await self._find_out(lost, attempts.deadline)) is not None:
                     return outcomes_now
+            except HELD_UP as error:
+                await self._roll_back()
+                self.connection.is_back()
+                lock_wait = await self._wait_again(error, readings, attempts, lock_wait) if self.gives_way else None
+                if lock_wait is None:
+                    busy = _busy(readings)
+                    log.warning("readings could not be stored: %s (%s)", busy.detail, error)
+                    return [busy] * len(readings)
             except psycopg.OperationalError as error:
                 await self._roll_back()
                 self.connection.is_away()
@@ -95,7 +131,7 @@ class ReadingStore:
                     log.exception("a reading of %s could not be stored", readings[0][0].characteristic)
                     return [_unexpected()]
                 log.exception("%s readings together could not be stored; storing them one by one", len(readings))
-                return [(await self.store([item]))[0] for item in readings]
+                return [await self._alone(item) for item in readings]
             else:
                 self.connection.is_back()
                 self._pessimistic_for = max(0, self._pessimistic_for - 1)
@@ -105,6 +141,34 @@ class ReadingStore:
                     if pipeline.distributed:
                         await self.connection.send(NOTIFY)
                 return outcomes
+
+    async def _alone(self, item: tuple[Entry, ReadingIn]) -> Outcome:
+        try:
+            return (await self.store([item]))[0]
+        except MachinesHeld:
+            return _busy([item])
+
+    async def _wait_again(
+        self,
+        error: psycopg.Error,
+        readings: Sequence[tuple[Entry, ReadingIn]],
+        attempts: Attempts,
+        waited: float | None,
+    ) -> float | None:
+        """Seconds to wait for locks in another attempt, None for no other. Raises `MachinesHeld`."""
+        pipeline = self.connection.pipeline
+        if pipeline is None or pipeline.closed or not isinstance(error, psycopg.errors.LockNotAvailable):
+            return None
+        machine_ids = {entry.machine_id for entry, _reading in readings}
+        with suppress(psycopg.Error):
+            (free,) = await pipeline.run(((FREE, array(machine_ids)),))
+            if held := machine_ids - {int(machine_id or 0) for (machine_id,) in free}:
+                raise MachinesHeld(held)
+        if "machine_state" in (error.diag.context or ""):  # and is free again
+            return waited if await attempts.another() else None
+        # No machine is held, but what all of them need.
+        patient = self.connection.patience * HELD
+        return patient if waited != patient and monotonic() + patient < attempts.deadline else None
 
     async def notify(self) -> None:
         """Wake who listens, if readings were stored without."""
@@ -130,30 +194,44 @@ class ReadingStore:
         await self.connection.roll_back()
 
     async def _find_out(self, lost: CommitLost, deadline: float) -> list[Outcome] | None:
-        """Return the outcomes of a commit if it is in the database, None if it must be done again."""
+        """Return the outcomes of a commit if it is in the database, None if it must be done again.
+
+        It is asked until the deadline, and at least for the time of one attempt, whether the database is silent or other work
+        holds the machine.
+        """
         connection = self.connection
-        attempts = Attempts(connection, deadline)
+        attempts = Attempts(connection, max(deadline, monotonic() + connection.patience * LAST_ATTEMPT))
         while True:
+            rest = max(attempts.deadline - monotonic(), LOOK)
             try:
-                async with asyncio.timeout(max(deadline - monotonic(), connection.patience * LAST_ATTEMPT)):
-                    stored = await committed(await connection.open(), lost)
+                async with asyncio.timeout(rest):
+                    pipeline = connection.pipeline
+                    if pipeline is None or pipeline.closed:
+                        pipeline = await connection.open()
+                    stored = await committed(pipeline, lost, rest)
             except (psycopg.OperationalError, TimeoutError) as error:
                 log.warning("how a commit ended cannot be asked yet: %s", str(error) or "no answer")
             else:
                 connection.is_back()
                 return lost.outcomes if stored else None
-            if not await attempts.another():
+            if not await attempts.another(silent=True):
                 return [OutcomeUnknown() if isinstance(o, Verdict | ColumnarReadings) else o for o in lost.outcomes]
 
 
-async def committed(pipeline: Pipeline, lost: CommitLost) -> bool:
+async def committed(pipeline: Pipeline, lost: CommitLost, seconds: float) -> bool:
     """Tell if the transaction whose commit was sent has stored its readings; if not, it cannot any more.
+
+    seconds: as long may it wait for a lock.
 
     Under the lock of a machine it has either ended or not begun, and moving the version keeps it from beginning.
     """
     first = new_verdicts(lost.outcomes)[0]
     entry = first.stream.entry
     async with pipeline.connection.transaction():
+        limit = f"{round(seconds * 1000)}ms"
+        await pipeline.connection.execute(
+            "SELECT set_config('lock_timeout', %s, true), set_config('statement_timeout', %s, true)", (limit, limit)
+        )
         await pipeline.connection.execute(
             "UPDATE machine_state SET version = version + 1 WHERE machine_id = %s", (entry.machine_id,)
         )
@@ -162,6 +240,11 @@ async def committed(pipeline: Pipeline, lost: CommitLost) -> bool:
             (entry.machine_id, entry.characteristic_id, first.sequence, first.received_at),
         )
         return await cursor.fetchone() is not None
+
+
+def _busy(readings: Sequence[tuple[Entry, ReadingIn]]) -> Busy:
+    machines = {entry.machine for entry, _reading in readings}
+    return Busy(machines.pop() if len(machines) == 1 else None)
 
 
 def _unexpected() -> InbandError:

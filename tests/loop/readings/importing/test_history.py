@@ -8,6 +8,7 @@ from datetime import UTC, datetime, timedelta
 from pathlib import Path
 from typing import Any
 
+import httpx
 import psycopg
 import pytest
 from sqlalchemy import text
@@ -278,15 +279,35 @@ def test_a_long_file_takes_little_memory(plant: Database, tmp_path: Path, count:
 
 def test_the_machine_goes_on_while_its_past_is_imported(shop: Shop, tmp_path: Path) -> None:
     path = table(tmp_path / "long.csv", [39.992 + at % 9 / 1000 for at in range(5_000)], begin="2020-01-01T00:00:00Z")
-    pushed = 0
-    importing = threading.Thread(target=run, args=(shop.server.database, path, shop.characteristic))
-    importing.start()
-    while importing.is_alive() or pushed < 20:
-        shop.read(0.0, key=f"live-{pushed}")
-        pushed += 1
+    dsn, staged = shop.server.database.dsn, 0
+
+    def live_at_every_hundredth() -> None:
+        """While its lines are judged, which is what takes the time, nobody waits for the import."""
+        nonlocal staged
+        staged += 1
+        if staged % 100 == 0:
+            shop.read(0.0, key=f"live-{staged}")
+
+    importing = threading.Thread(
+        target=run, args=(shop.server.database, path, shop.characteristic), kwargs={"progress": live_at_every_hundredth}
+    )
+    with psycopg.connect(dsn) as holding:
+        holding.execute("LOCK TABLE audit_entry IN EXCLUSIVE MODE")  # the last that an import writes, under the lock
+        importing.start()
+        until(lambda: rows(dsn, "SELECT 1 FROM pg_locks WHERE relation = 'audit_entry'::regclass AND NOT granted"))
+        assert len(history(dsn, shop.characteristic)) == 50, "every line was judged, and no machine waited"
+        refused = push_live(shop)
+        assert (refused.status_code, refused.json()["type"]) == (503, "urn:inband:problem:busy"), refused.text
     importing.join()
-    sequences = [reading["sequence"] for reading in history(shop.server.database.dsn, shop.characteristic)]
-    assert sequences == list(range(1, 5_000 + pushed + 1))
+    assert push_live(shop).json()["sequence"] == 5_051
+    sequences = [reading["sequence"] for reading in history(dsn, shop.characteristic)]
+    assert sequences == list(range(1, 5_052))
+
+
+def push_live(shop: Shop) -> httpx.Response:
+    """A reading as a machine sends it, and sends it again."""
+    reading = {"characteristic": shop.characteristic, "measured": 40.0, "key": "held up"}
+    return shop.machine_client.post("/api/v1/readings", json=reading)
 
 
 def test_killed_in_the_middle_nothing_of_it_is_there_and_it_can_be_repeated(plant: Database, tmp_path: Path) -> None:

@@ -16,6 +16,7 @@ import psycopg
 import pytest
 
 from app.core.parameters import Parameters, read
+from app.loop.readings.writer.connection import GIVE_WAY
 from tests.conftest import TLS, RunServer, Server
 from tests.loop.readings.load import Sender, all_at_once, scattered
 from tests.loop.readings.record import history, must_be_stored, must_hold, must_replay
@@ -23,6 +24,14 @@ from tests.loops import run
 from tests.shop import PARAMETERS, Shop
 
 pytestmark = pytest.mark.own_server  # every machine's lock is held, and its threads are watched
+
+
+@pytest.fixture(scope="module", autouse=True)
+def _patient() -> Iterator[None]:
+    """Machines are held here until many requests have gathered."""
+    with pytest.MonkeyPatch.context() as environment:
+        environment.setenv("INBAND_DATABASE_PATIENCE", "30")
+        yield
 
 
 @pytest.fixture
@@ -245,8 +254,9 @@ class locked:  # noqa: N801 - reads as a verb
 
 
 def until_locked_out(dsn: str) -> None:
-    """Wait until somebody waits for a lock in this database."""
-    waiting = "SELECT count(*) FROM pg_stat_activity WHERE wait_event_type = 'Lock' AND datname = current_database()"
+    """Wait until somebody waits for a lock in this database, and longer than readings of several machines would together."""
+    waiting = f"""SELECT count(*) FROM pg_stat_activity WHERE wait_event_type = 'Lock' AND datname = current_database()
+        AND query_start < clock_timestamp() - {2 * GIVE_WAY} * interval '1 second'"""  # noqa: S608 - a number of ours
     deadline = time.monotonic() + 60
     with psycopg.connect(dsn, autocommit=True) as connection:
         while not connection.execute(waiting).fetchone()[0]:  # type: ignore[index] # count(*) has a row

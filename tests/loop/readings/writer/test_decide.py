@@ -189,12 +189,12 @@ def test_a_transaction_that_was_asked_after_cannot_commit_later(database: Databa
         (verdict,) = outcomes
         assert isinstance(verdict, Verdict)
         assert verdict.sequence == 2
-        assert await committed(pipeline, CommitLost(outcomes))
+        assert await committed(pipeline, CommitLost(outcomes), 5.0)
         with pytest.raises(psycopg.errors.DivisionByZero):
             await transact(pipeline, {}, snapshot, reading, optimistic=True)
         await pipeline.run((("ROLLBACK",),))
         verdict.sequence = 3
-        assert not await committed(pipeline, CommitLost(outcomes))
+        assert not await committed(pipeline, CommitLost(outcomes), 5.0)
         await pipeline.connection.close()
 
     run(ask())
