@@ -21,12 +21,14 @@ from app.core.programs.lines import (
     LONGEST_LINE,
     NUMBER,
     UNIT,
+    WORD_ENDS,
     Note,
     Program,
     ProgramKind,
     ProgramText,
     describing,
     in_mm,
+    is_remark,
     line_of,
     mixed,
     no_number,
@@ -60,8 +62,8 @@ _BROKEN_ARGUMENT = re.compile(r"\s+[\d.,]+", re.ASCII)
 # On lathes G70 and G71 are the finishing and the roughing cycle, with words of their own.
 _TURNING_CYCLE = re.compile(r"\s*(?:[PQUWRDIK]\s*[-\d.#\[]|[A-Z]\s*\d*\.?\s*[PQUWD]\s*[-\d.#\[])", re.IGNORECASE)
 _ARGUMENT = re.compile(rf"A\s*({NUMBER})", re.IGNORECASE | re.ASCII)
-_WORD = re.compile(rf"[A-Z]\s*(?:{NUMBER}|#\s*\d+)(?![\w.])|%\S*", re.IGNORECASE | re.ASCII)
-_CHOOSES_OFFSET = re.compile(r"IF\s*\[\s*#1\s+EQ\s*5[4-9]\.?0*\s*\]", re.IGNORECASE)
+_WORD = re.compile(rf"[A-Z]\s*(?:{NUMBER}|#\s*\d+){WORD_ENDS}|%\S*", re.IGNORECASE | re.ASCII)
+_CHOOSES_OFFSET = re.compile(r"IF\s*\[\s*#1\s*EQ\s*5[4-9]\.?0*\s*\]", re.IGNORECASE)
 _BRACKET = re.compile(r"[A-Z]\s*-?\[", re.IGNORECASE | re.ASCII)
 _COMMENT = re.compile(r";(.*)$|\(([^()]*)\)|\((.*)$")
 
@@ -171,6 +173,9 @@ class _Reader:
             elif (match := _BRACKET.match(body, at)) and (end := _closing(body, match.end())):
                 passed.append(body[at:end])
                 at = end
+            elif is_remark(body[:at], body[at:]):
+                notes.append(Note("remark", {"text": body[at:].strip()[:200]}))
+                break
             else:
                 end = next((i for i in range(at, len(body)) if body[i].isspace()), len(body))
                 unknown.append(body[at:end])
@@ -220,7 +225,7 @@ class _Reader:
             if self.inch:
                 inches, value = {"inch": value}, in_mm(value, True)
         if variable == 1 and self.chooses_offset:
-            notes.append(Note("not_used", {"r": r}))
+            notes.append(Note("step", {"step": "offset_chosen", "r": r, "value": value}))
         elif variable in INPUTS:
             self._assign(number, INPUTS[variable], r, value, notes)
             notes.append(Note("assigned", _assigned(r, INPUTS[variable], value) | inches))

@@ -21,12 +21,15 @@ MOST_LINES = 4_000
 LONGEST_LINE = 1_000  # no control takes half of it
 NUMBER = r"[+-]?(?:\d+(?:[.,]\d*)?|[.,]\d+)"
 MM_PER_INCH = 25.4
+WORD_ENDS = r"(?![\d.])(?![A-Z_](?!\s*=?\s*[-+]?\s*[.\d#\[]))"
+"""Behind a number: the next word may follow without a blank, as in ``G1X10.Y20.``; what is not a word may not."""
 UNIT = re.compile(
     r"G\s*0*(?:(20|70|700)|21|71|710)(?![\d.])|BEGIN\s+PGM\s+\S+\s+(?:(INCH)|MM)\b", re.IGNORECASE | re.ASCII
 )
 _DIGITS_ONLY = re.compile(r"[+-]?\s*[\w.,]*\d[\d.,\s]*")
 _BLANK_INSIDE = re.compile(r"[\d.,+-]\s+[\d.,]")
 PLAIN = re.compile(r"[ -$&'*-:<-z|~]")  # ASCII that no control takes for the end of a comment; others travel as {D8}
+_REMARK = re.compile(r"(?!(?:in|inch|inches|mil|cm|um|[µμ]m)\b)[^\W\d_][^\W\d_]+[^\d_=#*/+<>$%&@\[\]{}\"]*")
 SETTING = re.compile(r"\s*INBAND\s+([A-Za-z_]+)\s*=(.*)", re.IGNORECASE)
 DESCRIBING = ("characteristic", "name", "part")
 
@@ -46,7 +49,7 @@ class Note(NamedTuple):
     ``q_assigned``, ``cut_out``, ``as_number``, and the warnings ``q_range``, ``q_missing``, ``tcpm_active``, ``tilted``,
     ``rotated``, and not understood ``unknown_q``, ``cut_wrong``. Warnings about what was taken:
     ``r44_for_r34``, ``again``, ``skip_block``, ``not_used``, ``macro``, ``assumed``, ``l75_missing``, ``l75_wins``,
-    ``two_point``, ``no_tool``, ``from_inch``, ``printed_minus``. Passed over: ``comment``, ``empty``, ``words``,
+    ``two_point``, ``no_tool``, ``from_inch``, ``printed_minus``, ``remark``. Passed over: ``comment``, ``empty``, ``words``,
     ``computed``. Not understood: ``expression``, ``no_value``, ``no_number``, ``blank_in_number``, ``unit_mixed``,
     ``placeholder``, ``unknown_r``, ``unknown``, ``too_large``, ``too_long``, ``bad_setting``.
     """
@@ -61,6 +64,7 @@ TAKEN = frozenset(
 )
 WARNINGS = frozenset(
     {"r44_for_r34", "again", "skip_block", "not_used", "macro", "assumed", "l75_missing", "l75_wins", "two_point"}
+    | {"remark"}
     | {"unit_inch", "printed_minus", "q_range", "q_missing", "tcpm_active", "tilted", "rotated"}
     | {"no_tool", "from_inch", "feeler_range"}  # of the whole program
 )
@@ -202,6 +206,21 @@ def mixed(units: Iterable[bool | None]) -> bool:
     (False, False, True)
     """
     return len({bool(unit) for unit in units}) > 1
+
+
+def is_remark(block: str, rest: str) -> bool:
+    """Tell if the rest of a block is words for people that stand there without ``;`` or brackets.
+
+    block: what was read before it. Only words without numbers and signs are a remark, and only where they are not in the
+    capitals that the block itself is written in, so that no statement of a control passes for one.
+
+    >>> is_remark("N10 L93 ", "measuring cycle"), is_remark("N10 R33=0.001 ", "GOTOF END"), is_remark("", "bore")
+    (True, False, False)
+    >>> is_remark("R33=0.001 ", "inch")
+    False
+    """
+    in_words = _REMARK.fullmatch(rest) and not all("A" <= letter <= "Z" for letter in rest if letter.isalpha())
+    return bool(block.strip() and block.upper() == block and in_words)
 
 
 def no_number(r: str, text: str) -> Note:

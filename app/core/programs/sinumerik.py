@@ -19,11 +19,13 @@ from app.core.programs.lines import (
     LONGEST_LINE,
     NUMBER,
     UNIT,
+    WORD_ENDS,
     Note,
     Program,
     ProgramKind,
     ProgramText,
     in_mm,
+    is_remark,
     line_of,
     no_number,
     number_in,
@@ -83,9 +85,12 @@ _PLAIN_VALUE = _pattern(rf"({_VALUE}){_ENDS}")
 _EXPRESSION = _pattern(_UP_TO_NEXT)
 _TOGETHER = _pattern(rf"R\s*(\d{{2}})\s*\*?\s*(?:({_VALUE}){_ENDS}|(X+(?:\.X+)?)(?![A-Z0-9])|(?=\s|$))")
 _BROKEN_TOGETHER = _pattern(r"R\s*(\d{2})\s*\*?\s*([+-]\s+[\d.,]+(?:\s+[\d.,]+)*|[+-]?[\d.,]+(?:\s+[\d.,]+)+)")
-_CALL = _pattern(r"(L\s*\d{1,4}|CYCLE\d{3,4})(?![\w.])")
-_WORD = _pattern(rf"(?:[GMTFSDHXYZIJKUVWABCPQ]\s*=?\s*{NUMBER}|%\S*|PROC\s+\w+|EXTERN\s+\w+|RET|STOPRE|MSG)(?![\w.])|%")
-_ENDING = _pattern(r"(?<![A-Z0-9])(?:M\s*0*(?:2|17|30)|RET)(?![\w.])")
+_CALL = _pattern(r"(L\s*\d{1,4}|CYCLE\d{3,4})" + WORD_ENDS)
+_WORD = _pattern(
+    rf"[GMTFSDHXYZIJKUVWABCPQ]\s*=?\s*{NUMBER}{WORD_ENDS}"
+    r"|(?:%\S*|PROC\s+\w+|EXTERN\s+\w+|RET|STOPRE|MSG)(?![\w.])|%"
+)
+_ENDING = _pattern(rf"(?<![A-Z_$])(?:M\s*0*(?:2|17|30){WORD_ENDS}|RET(?![\w.]))")
 _HEADING = _pattern(r"%.*|L\s*(?!(?:75|92|93)$)\d+|PROC\s+\w+")
 _COMMENT = re.compile(r";(.*)$|\(([^()]*)\)|\((.*)$")
 
@@ -187,6 +192,9 @@ class _Reader:
             elif match := _WORD.match(body, at):
                 passed.append(match[0])
                 at = match.end()
+            elif is_remark(body[:at], body[at:]):
+                notes.append(Note("remark", {"text": body[at:].strip()[:200]}))
+                break
             else:
                 match = re.compile(r"\S+").match(body, at)
                 assert match is not None

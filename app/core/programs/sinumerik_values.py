@@ -8,6 +8,7 @@ from app.core.programs.lines import DESCRIBING, Note, Program, ProgramKind, in_m
 ONLY_CALIBRATION = ("R21", "R22")
 PROBES = {1: "axial", 2: "radial"}
 RESULTS = ("R43", "R44", "R46", "R47", "R49")
+POINTS_OF_CALIBRATION = "R23"  # which surface of the gauge is touched, as R21
 RESULT_LENGTHS = ("R43", "R44", "R49")
 OF_CALIBRATION = (*ONLY_CALIBRATION, *RESULTS, "points")
 
@@ -94,6 +95,16 @@ class _Assembly:
         assigned = self.values[name]
         self.line_notes[assigned.line - 1].append(Note(code, {"r": assigned.r or name} | data))
 
+    def _rename(self, name: str, meaning: str) -> None:
+        """Give the note of an assignment the meaning that the number has in this program."""
+        notes = self.line_notes[self.values[name].line - 1]
+        notes[:] = [
+            Note(note.code, note.data | {"name": meaning})
+            if note.code == "assigned" and note.data["name"] == name
+            else note
+            for note in notes
+        ]
+
     def _drop(self, name: str, code: str = "not_used") -> None:
         if name in self.values:
             self._beside(name, code)
@@ -115,10 +126,13 @@ class _Assembly:
         if "averaging_limit" in self.values:
             self._drop("R44")
             return
+        self._rename("R44", "averaging_limit")
         self._beside("R44", "r44_for_r34")
         self.values["averaging_limit"] = self.values.pop("R44")
 
     def _calibration(self) -> dict[str, Any]:
+        if "points" in self.values:
+            self._rename("points", POINTS_OF_CALIBRATION)
         points = self.values.pop("points", None)
         surface = self.values.pop("R21", None)
         probe = self.values.pop("R22", None)

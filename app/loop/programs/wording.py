@@ -57,13 +57,14 @@ def note(said: Note) -> str:
         "call": _call(str(values.get("word", ""))),
         "r44_for_r34": _("R44 is taken for R34, as the manual misprints it; check that it is the averaging limit"),
         "skip_block": _("The block begins with /: on the control it is left out while block skip is on"),
-        "not_used": _("{r} is not used here"),
+        "not_used": _("Inband does not use {r}"),
         "feeler_range": _("The feeler (#2) is {value} mm: the macro raises an alarm outside 0 to {highest} mm"),
         "no_tool": _("No tool is named (R10): as it stands it measures only, and nothing is corrected"),
         "l75_missing": _("L75 is not called; target and tolerance are computed from R40, R41 and R42 all the same"),
         "l75_wins": _("{r} is computed again by L75, so this value does not count"),
         "two_point": _("{r} does not count, because R24 asks for two points"),
         "comment": _("comment"),
+        "remark": _("{text}: read as a remark. Put it behind ; or in brackets, else the control stops at it"),
         "empty": _("empty line"),
         "words": _("{words}: no parameters"),
         "computed": _("{text}: computed by the macro itself"),
@@ -108,6 +109,7 @@ def _step(data: dict[str, Any]) -> str:
         "centre": _("{r}: the middle between two points"),
         "old_kept": _("{r}: the old {axis} of {offset} is kept"),
         "offset_set": _("{axis} of {offset} is set to {r}"),
+        "offset_chosen": _("{r}: G{value}, the work offset that the macro sets"),
         "feeler": _("{r}: thickness of the feeler, {value} mm"),
         "z_zero": _("{r}: Z zero, less the feeler and the length of the tool"),
         "limit_size": _("{r}: a limit of the size, from nominal and deviation"),
@@ -220,7 +222,7 @@ def _taken(said: Note) -> str:
         )
     if said.code == "setting":
         return _("{name}: {value}").format(name=_named(data["name"]), value=value)
-    words = {"r": data["r"], "value": value, "name": variable(data["r"]) or (_named(name) if name else "")}
+    words = {"r": data["r"], "value": value, "name": _meaning(data["r"], name)}
     if data["how"] == "run_together":
         return _("{r} = {value} {name}, written without =").format(**words)
     if data["how"] == "name":
@@ -228,11 +230,17 @@ def _taken(said: Note) -> str:
     return _("{r} = {value} {name}").format(**words).rstrip()
 
 
+def _meaning(r: str, name: str | None) -> str:
+    known = BY_NAME.get(name or "")
+    return label(known.name).lower() if known is not None else variable(r) or (_named(name) if name else "")
+
+
 def variable(r: str) -> str:
     """Meaning of a number that is no parameter here: of the calibration, of the macros, of a cycle's results."""
     return {
         "R21": _("surface"),
         "R22": _("probe"),
+        "R23": _("surface, 0 free"),
         "R24": _("two-point measurement, 0 off"),
         "R42": _("nominal"),
         "R43": _("measured"),

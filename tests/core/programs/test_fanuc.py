@@ -11,6 +11,7 @@ from app.core.programs import fanuc
 from app.core.programs.correction_forms import Form
 from app.core.programs.corrections import PendingCorrection, steps, write
 from app.core.programs.lines import LineVerdict, Program, ProgramError, ProgramKind, ProgramText
+from app.loop.programs.wording import note
 from tests.chance import examples
 from tests.core.programs.conftest import parameter_sets
 
@@ -131,6 +132,27 @@ N200 M30
 def test_the_choice_of_a_work_offset_is_no_tool() -> None:
     fragment = fanuc.read("#1=54.\n#2=0.\nIF [#1 EQ 54] GOTO54\nN54 M3 S60")
     assert fragment.programs == ()
+
+
+def test_the_choice_of_a_work_offset_says_what_it_is_used_for() -> None:
+    for compared in ("IF [#1 EQ 54] GOTO54", "IF[#1EQ54]GOTO54"):
+        text = fanuc.read(f"#1=54.0\n{compared}\nN54M3S60")
+        assert text.programs == ()  # no tool 54
+        (chosen,) = text.lines[0].notes
+        assert note(chosen) == "#1: G54, the work offset that the macro sets"
+
+
+def test_words_need_no_blanks_between_them() -> None:
+    text = fanuc.read("M3S60\nG0X10Z5\nG1X10.Y20.\nX#101Y#102\nG31Z-15F500P1L1000\nG90G20\n#505=2.G65P9011A3.M99")
+    assert LineVerdict.NOT_UNDERSTOOD not in {line.verdict for line in text.lines}
+    assert text.program is not None
+    assert (text.program.parameters["nominal"], text.program.parameters["tool_memory"]) == (50.8, 3)
+
+
+def test_a_remark_beside_a_block_leaves_it_understood() -> None:
+    text = fanuc.read("#505=40.0 nominal\n#506=0.02\tupper limit\n#507=0.01 inch")
+    assert [line.verdict.value for line in text.lines] == ["understood", "understood", "not_understood"]
+    assert [note.code for note in text.lines[1].notes] == ["assigned", "remark"]
 
 
 def test_the_edge_finder_macro_of_the_source_is_read() -> None:

@@ -11,6 +11,7 @@ from app.core.probing import direction_of
 from app.core.programs import sinumerik
 from app.core.programs.lines import LineVerdict, ProgramError, ProgramKind, ProgramText, written
 from app.core.programs.sinumerik_writing import Calibration, write_calibration, write_measuring
+from app.loop.programs.wording import note
 from tests.chance import examples
 from tests.core.programs.conftest import parameter_sets
 
@@ -120,8 +121,16 @@ class TestSource:
 
     def test_its_explanations_are_named(self) -> None:
         text = sinumerik.read("N5 M73 uključivanje IC kamere\nN25 L92")
-        assert codes(text, 1) == ["words", "unknown"]
-        assert text.lines[0].notes[1].data == {"text": "uključivanje IC kamere"}
+        assert codes(text, 1) == ["remark", "words"]
+        assert text.lines[0].notes[0].data == {"text": "uključivanje IC kamere"}
+
+    def test_remarks_beside_its_blocks_leave_the_blocks_understood(self) -> None:
+        remarks = ("potprogram", "uključivanje IC kamere", "vreme čekanja", "", "parametri kalibracije", "", "kraj")
+        beside = "\n".join(f"{block}\t{remark}" for block, remark in zip(L05.splitlines(), remarks, strict=True))
+        read_beside, alone = sinumerik.read(beside), sinumerik.read(L05)
+        assert read_beside.programs == alone.programs
+        assert [line.verdict for line in read_beside.lines] == [line.verdict for line in alone.lines]
+        assert ["remark" in codes(read_beside, line) for line in range(1, 8)] == [bool(remark) for remark in remarks]
 
     def test_results_of_a_calibration(self) -> None:
         program = sinumerik.read("R42=199.852 R43=199.8534\nR44=0.0014 R46=5 R47=30 R49=0.0012").program
@@ -190,6 +199,12 @@ def test_forms_of_an_assignment(text: str, found: dict[str, Any]) -> None:
         ("R240=1", "unknown_r"),
         ("R5012", "unknown_r"),
         ("R4", "unknown"),
+        ("measuring subprogram", "unknown"),
+        ("M73 GOTOF", "unknown"),
+        ("m73 bez opisa", "unknown"),
+        ("M73 2 points", "unknown"),
+        ("G1X10.Y", "unknown"),
+        ("G1X1.0.5Y20.", "unknown"),
         ("L99", "unknown"),
         ("R33=" + "9" * 400, "too_large"),
         ("R33=1E999", "too_large"),
@@ -204,6 +219,32 @@ def test_what_is_not_understood_is_named_and_not_taken(text: str, code: str) -> 
     assert found.lines[0].verdict is LineVerdict.NOT_UNDERSTOOD
     assert code in codes(found, 1)
     assert parameters_in(text) == {}
+
+
+def test_words_need_no_blanks_between_them() -> None:
+    text = sinumerik.read(
+        "M3S60\nG0X10Z5\nN10G1X10.Y20.F500M8\nG54G90G40\nG0X=10Z-5.R33=0.001R34=0.01\nN20L93M17\nR33=9"
+    )
+    assert LineVerdict.NOT_UNDERSTOOD not in {line.verdict for line in text.lines}
+    measuring = text.programs[0]
+    assert measuring.parameters == {"zero_range": 0.001, "averaging_limit": 0.01}
+    assert (measuring.last_line, measuring.kind) == (6, ProgramKind.MEASURING)  # M17 ends it, behind L93 as well
+    assert parameters_of("G90G70R33=0.001L93M17") == {"zero_range": 0.0254}
+
+
+def test_each_number_has_the_name_of_its_meaning() -> None:
+    """R44 is the misprint of R34, and in a calibration a result; R23 counts points, and in a calibration tells the surface."""
+    text = sinumerik.read("R10=3 R23=5 R44=0.005\nL93\nM17\nL05\nR23=0 R21=1\nL92\nM17\nR43=40.01 R44=0.01")
+    names = {(number, said.data["r"]): note(said) for number in (1, 5, 8) for said in text.lines[number - 1].notes}
+    named = {
+        key: sentence for key, sentence in names.items() if key[1] in {"R23", "R44"} and "taken for" not in sentence
+    }
+    assert named == {
+        (1, "R23"): "R23 = 5 measuring points",
+        (5, "R23"): "R23 = 0 surface, 0 free",
+        (8, "R44"): "R44 = 0.01 difference",
+    }
+    assert note(text.lines[0].notes[2]) == "R44 = 0.005 mm averaging limit"
 
 
 def test_a_calculation_does_not_leave_the_value_before_it_standing() -> None:
