@@ -109,6 +109,10 @@ def _warnings(plan: MeasuringPlan) -> Iterator[CodedWarning]:
         yield CodedWarning("no_axis", {}, "axes")
     if plan.feed == 0:
         yield CodedWarning("feed_zero", {}, "feed")
+    if plan.cycle == 452:
+        for field, q, value in (("mode", "Q406", plan.mode), ("preset", "Q431", plan.preset)):
+            if value:
+                yield CodedWarning("only_451", {"q": q, "value": value}, field)
     for number, axis in enumerate(plan.axes):
         if axis.points:
             yield from _of_axis(plan, axis, f"axes[{number}]")

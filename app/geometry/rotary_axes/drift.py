@@ -13,13 +13,17 @@ SHORTEST = 1 / 24
 
 
 class Measured(NamedTuple):
-    """Values of a run for the drift; in_effect: the values entered on the control by then."""
+    """Values of a run for the drift; in_effect: the values entered on the control by then.
+
+    waits: it waits to be confirmed, because its change is too large or hardly plausible; no trend is computed of it.
+    """
 
     number: int
     measured_at: datetime
     results: Mapping[str, Any]
     in_effect: Mapping[str, float]
     head: str = ""
+    waits: bool = False
 
 
 class Reached(NamedTuple):
@@ -30,10 +34,11 @@ class Reached(NamedTuple):
     value: float
     true: float
     deviation: float | None
+    waits: bool = False
 
 
 class Drift(NamedTuple):
-    """A value over the runs. trend: of its true course, whatever was entered meanwhile."""
+    """A value over the runs. trend: of its true course, whatever was entered meanwhile, without runs to be confirmed."""
 
     name: str
     limit: float | None
@@ -65,10 +70,12 @@ def drift(name: str, runs: Sequence[Measured], limit: float | None) -> Drift:
         value = values_of(run.results).get(name)
         if value is not None:
             true = value + run.in_effect.get(name, 0.0)
-            points.append(Reached(run.number, run.measured_at, value, true, deviations_of(run.results).get(name)))
-    days = [point.at.timestamp() / DAY for point in points]
+            sure = deviations_of(run.results).get(name)
+            points.append(Reached(run.number, run.measured_at, value, true, sure, run.waits))
+    counting = [point for point in points if not point.waits]
+    days = [point.at.timestamp() / DAY for point in counting]
     long = bool(days) and days[-1] - days[0] >= SHORTEST
-    return Drift(name, limit, points, trend(days, [point.true for point in points]) if long else None)
+    return Drift(name, limit, points, trend(days, [point.true for point in counting]) if long else None)
 
 
 def drifts(runs: Sequence[Measured], limits: Mapping[str, float]) -> list[Drift]:

@@ -30,7 +30,7 @@ class BackupOut(BaseModel):
 
 
 class DriftOut(BaseModel):
-    """A value over the runs. true: with what had been entered by then; the slope, per day, is of that."""
+    """A value over the runs. true: with what had been entered by then; the slope, per day, is of that, without runs to be confirmed."""
 
     name: str
     unit: str

@@ -168,10 +168,11 @@ def course(drift: Drift) -> Chart:
     if any(base):
         marks.append(Series(at, base, Pen("correction", 2, steps="hv"), meta=_("entered")))
     if drift.trend is not None:
-        days = [moment.timestamp() / 86_400 for moment in at]
-        middle, mean = sum(days) / len(days), sum(point.true for point in drift.points) / len(days)
+        counting = [point for point in drift.points if not point.waits]
+        days = [point.at.timestamp() / 86_400 for point in counting]
+        middle, mean = sum(days) / len(days), sum(point.true for point in counting) / len(days)
         ends = [(mean + drift.trend.slope * (day - middle)) * factor for day in (min(days), max(days))]
-        marks.append(Series([min(at), max(at)], ends, Pen("quiet", dash="dot"), meta=_("trend")))
+        marks.append(Series([counting[0].at, counting[-1].at], ends, Pen("quiet", dash="dot"), meta=_("trend")))
     beyond = [drift.limit is not None and abs(point.value) > drift.limit for point in drift.points]
     spread = [2 * (point.deviation or 0.0) * factor for point in drift.points]
     marks.append(
@@ -187,7 +188,9 @@ def course(drift: Drift) -> Chart:
             spread=Spread(spread) if any(spread) else None,
             meta=drift.name,
             hover=[
-                f"{_('run {n}').format(n=point.number)}: {point.true * factor:+.4g} {unit}" for point in drift.points
+                f"{_('run {n}').format(n=point.number)}: {point.true * factor:+.4g} {unit}"
+                + (f", {_('to be confirmed')}" if point.waits else "")
+                for point in drift.points
             ],
             links=[f"/kinematics/runs/{point.number}" for point in drift.points],
         )

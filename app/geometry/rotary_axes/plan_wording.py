@@ -10,6 +10,7 @@ def sentence(warning: CodedWarning) -> str:
     return {
         "no_axis": _("No axis is measured: the cycle finds the drift of the sphere alone"),
         "feed_zero": _("Q253 is 0: the axes would not move. Say a feed, or FMAX, FAUTO or PREDEF"),
+        "only_451": _("{q} = {value} is left out: cycle 452 has no such parameter, cycle 451 has"),
         "few_positions": _(
             "Axis {axis} is measured at {got} different angles; Inband computes an axis from {needed} on"
         ),

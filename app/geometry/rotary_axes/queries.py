@@ -180,6 +180,11 @@ def of_machine(session: Session, machine_id: int) -> list[KinematicsRun]:
     return list(reversed(session.scalars(newest).all()))
 
 
+def to_confirm(session: Session, machine: Machine, runs: Sequence[KinematicsRun]) -> set[int]:
+    """Return the numbers of those runs that wait to be confirmed."""
+    return {row.run.id for row in _rows(session, [(run, machine) for run in runs]) if row.status == "to_confirm"}
+
+
 def is_latest(session: Session, run: KinematicsRun) -> bool:
     """Tell if no run that counts was measured later with this head."""
     later = select(KinematicsRun.id).where(

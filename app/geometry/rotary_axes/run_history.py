@@ -1,6 +1,6 @@
 """Runs compared: over time, two of them, or two heads. Never writes."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from math import isclose
 from typing import Any, NamedTuple, TypeVar
 
@@ -99,11 +99,15 @@ def surer(results: Mapping[str, Any]) -> Mapping[str, Any]:
 
 def measured(session: Session, machine: Machine, head: str) -> list[Measured]:
     """The runs with one head, in the order of their time."""
-    return chained([run for run in queries.of_machine(session, machine.id) if run.head == head])
+    runs = [run for run in queries.of_machine(session, machine.id) if run.head == head]
+    return chained(runs, queries.to_confirm(session, machine, runs))
 
 
-def chained(runs: Sequence[KinematicsRun]) -> list[Measured]:
-    """Runs with one head in the order of their time, each with what had been entered by then, recorded or not."""
+def chained(runs: Sequence[KinematicsRun], to_confirm: Collection[int]) -> list[Measured]:
+    """Runs with one head in the order of their time, each with what had been entered by then, recorded or not.
+
+    to_confirm: numbers of those that wait to be confirmed.
+    """
     more: dict[str, float] = {}
     last: dict[str, KinematicsRun] = {}
     series = []
@@ -115,7 +119,7 @@ def chained(runs: Sequence[KinematicsRun]) -> list[Measured]:
                     more[name] = more.get(name, 0.0) + value
             if axis["position_before"] is not None:
                 last[letter] = run
-        series.append(as_measured(run, more))
+        series.append(as_measured(run, more)._replace(waits=run.id in to_confirm))
     return series
 
 

@@ -12,7 +12,7 @@ from app.core.rotary.sphere import NoSphere, SphereFault
 from app.core.warning import CodedWarning
 from app.files.formats.rotary_protocol import Unread
 from app.geometry.rotary_axes.result_values import AXIS_OF, UNITS
-from app.language.i18n import _
+from app.language.i18n import _, ngettext
 from app.language.numbers import NO_BREAK_SPACE, NOTHING, mm, plain_um, short, signed, um, um_limit
 from app.language.times import in_sentence
 
@@ -275,7 +275,18 @@ def alarm_sentence(data: Mapping[str, Any]) -> str:
 
 def trend_sentence(drift: Drift) -> str:
     """Rate of change of a value, and if that is more than scatter."""
-    if drift.trend is None and len(drift.points) >= FEWEST:
+    waiting = sum(point.waits for point in drift.points)
+    if not waiting:
+        return _rate_sentence(drift)
+    return f"{_rate_sentence(drift)} " + ngettext(
+        "A run that waits to be confirmed does not count in it.",
+        "{n} runs that wait to be confirmed do not count in it.",
+        waiting,
+    ).format(n=waiting)
+
+
+def _rate_sentence(drift: Drift) -> str:
+    if drift.trend is None and sum(not point.waits for point in drift.points) >= FEWEST:
         return _(
             "No trend can be determined: these runs do not vary (their resolution is too coarse), or were made at the same time."
         )

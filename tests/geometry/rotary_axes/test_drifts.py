@@ -44,6 +44,26 @@ class TestDrift:
         drifts = shop.call("GET", f"/machines/{shop.machine}/kinematics")["drift"]
         assert {each["slope_per_day"] for each in drifts} == {None}
 
+    def test_a_run_that_waits_to_be_confirmed_counts_in_no_drift(self, shop: Shop) -> None:
+        """A sphere that stands 1.5 mm off moves no axis; confirmed, it counts."""
+
+        def found() -> Any:
+            drifts = shop.call("GET", f"/machines/{shop.machine}/kinematics")["drift"]
+            return next(each for each in drifts if each["name"] == "EX0C")
+
+        plan(shop, max_modification=0.05)
+        self.series(shop, 0.001, 0.003, 0.006, 0.008, 0.011)
+        before = found()
+        wild = take(shop, axes=[axis((1.5, 0, 0, 0), seed=9)], measured_at="2026-10-09T06:00:00Z")
+        assert wild["status"] == "to_confirm"
+        assert found()["slope_per_day"] == before["slope_per_day"]
+        assert found()["last"] == pytest.approx(1.5, abs=0.01)
+        assert "A run that waits to be confirmed does not count" in found()["text"]
+        figure = shop.call("GET", f"/machines/{shop.machine}/kinematics/drift-figure?value=EX0C")
+        assert "to be confirmed" in str(figure["data"][-1])
+        shop.call("POST", f"{RUNS}/{wild['run']}/confirm", reason="The axis was hit")
+        assert found()["slope_per_day"] > 10 * before["slope_per_day"]
+
     def test_two_runs_side_by_side(self, shop: Shop) -> None:
         old, new = self.series(shop, 0.001, 0.011)
         for a, b in ((old, new), (new, old)):

@@ -23,6 +23,18 @@ def test_a_plan_is_answered_with_positions_and_program(shop: Shop) -> None:
     assert read["programs"][1]["parameters"] == {"cycle": 452} | answer["values"]
 
 
+def test_what_cycle_452_does_not_have_is_warned_of_when_it_is_left_out(shop: Shop) -> None:
+    body: dict[str, Any] = {"cycle": 452, "ball_radius": 12.5, "axes": [C], "preset": 2, "mode": 1}
+    answer = shop.call("POST", "/kinematics/measuring-plans", **body)
+    assert "Q406" not in answer["text"]
+    assert [(each["code"], each["field"]) for each in answer["warnings"]] == [
+        ("only_451", "mode"),
+        ("only_451", "preset"),
+    ]
+    assert "Q431 = 2 is left out" in answer["warnings"][1]["text"]
+    assert shop.call("POST", "/kinematics/measuring-plans", **body | {"cycle": 451})["warnings"] == []
+
+
 @pytest.mark.parametrize(
     ("change", "field"),
     [
