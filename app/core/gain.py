@@ -30,28 +30,21 @@ from app.core.compiled import compiled
 Floats = NDArray[np.float64]
 
 LONGEST = 48  # parts that are looked at
-BEFORE, NEAR = (
-    3,
-    5,
-)  # parts before the first correction that count; on either side of a correction, that say what it did
+# Parts before the first correction that count; on either side of a correction, that say what it did.
+BEFORE, NEAR = 3, 5
 LEVEL_STEP = 0.1  # variance of a step of the level over that of the scatter
 OPPOSITE = -0.3  # the gain is below this: with wear, that of corrections that do nothing is a little below 0
 SURE_OPPOSITE, SURE_NOT_WEAK = 3.0, 5.0  # standard errors that the gain is below 0, and below half of what was asked
 LARGEST_ERROR = 0.27  # of the gain
 LEAST = 1.5  # times the scatter that each of the two asks for: smaller ones say nothing
 NOT_DONE, FARTHEST = 0.25, -3.5  # the gain of each of the two alone: beyond, something else has happened, an edge broke
-AGAIN = (
-    -0.25
-)  # and that of the second, the larger one where a sign is wrong: an edge that wears off quickly only seems to undo it
+# And that of the second, the larger one where a sign is wrong: an edge that wears off quickly only seems to undo it.
+AGAIN = -0.25
 SURE_FIRST, SURE_SECOND = 1.9, 3.5  # standard errors that they are below 1, and below half
-KNOWN, FRESH = (
-    20,
-    8.0,
-)  # until so many parts have shown the scatter, the first correction is so many times what it seems to be
-ITSELF = (
-    4.5  # standard deviations of a step from part to part: the size moved so far by itself, as where an edge breaks
-)
-ITSELF = 4.0  # standard deviations of a step between two parts of one correction: the process moved by itself, as where an edge breaks
+# Until so many parts have shown the scatter, the first correction is so many times what it seems to be.
+KNOWN, FRESH = 20, 8.0
+# Standard deviations of a step between two parts of one correction: the process moved by itself, as where an edge breaks.
+ITSELF = 4.0
 PRIOR, FEW = 3.0, 1.0  # parts that the expected scatter is worth; by how much surer one must be while it is not known
 NM = 1e-6
 
