@@ -40,13 +40,20 @@ class Outcome(StrEnum):
     PAIRED = "paired"
     WINDOW = "window"
     PROBE_FAULT = "probe_fault"
+    NO_TOUCH = "no_touch"
     NOT_A_BORE = "not_a_bore"
     WRONG_GAUGE = "wrong_gauge"
 
     @property
     def refused(self) -> bool:
         """Tell if the calibration was refused and changes nothing."""
-        return self in {Outcome.WINDOW, Outcome.PROBE_FAULT, Outcome.NOT_A_BORE, Outcome.WRONG_GAUGE}
+        return self in {
+            Outcome.WINDOW,
+            Outcome.PROBE_FAULT,
+            Outcome.NO_TOUCH,
+            Outcome.NOT_A_BORE,
+            Outcome.WRONG_GAUGE,
+        }
 
 
 @dataclass(frozen=True)
@@ -129,6 +136,20 @@ def calibrate(gauge: Gauge, touches: Sequence[float], *, empirical_value: float,
     if within(nanometres(updated), zero):
         return result(Outcome.AVERAGE_KEPT, updated)
     return result(Outcome.AVERAGED_DIFFERENCE, updated, updated)
+
+
+def untouched(touches: Sequence[float | None], repeats: int | None = None) -> int | None:
+    """Return the first repeat at which the probe did not trigger, from 1; None where each one did.
+
+    repeats: R27; fewer touches than that are missing at the end.
+
+    >>> untouched([40.001, None, 40.0]), untouched([40.001], 3), untouched([]), untouched([40.001, 40.0])
+    (2, 2, 1, None)
+    """
+    for repeat, touch in enumerate(touches, start=1):
+        if touch is None:
+            return repeat
+    return len(touches) + 1 if len(touches) < (repeats or 1) else None
 
 
 def gauge_in_inches(size: float, touches: Sequence[float], known: Sequence[float] = ()) -> list[CodedWarning]:

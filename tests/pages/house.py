@@ -116,6 +116,11 @@ PAGES = {
         "/calibration/{machine}/averages/6",
         "/calibration/{machine}/probes/32",
     ],
+    "/calibration/{machine}/{memory}/{location}/{number}": [
+        "/calibration/{machine}/averages/5/1",
+        "/calibration/{machine}/averages/5/3",
+        "/calibration/{machine}/probes/32/4",
+    ],
     "/calibration/{machine}/{memory}/{location}/{what}/{number}": [
         "/calibration/{machine}/averages/5/accept/1",
         "/calibration/{machine}/averages/6/suggestion/0",
@@ -240,7 +245,7 @@ def furnished(server: Server) -> Shop:
     made.call("POST", f"{tests}/{test}/report", **example_of("TouchTestReport"))
     calibrations = f"/machines/{made.machine}/calibrations"
     limits: dict[str, Any] = {"zero_range": 0.001, "averaging_limit": 0.01, "confidence_limit": 1.0}
-    for touches in ([199.8553], [201.9]):
+    for touches in ([199.8553], [201.9], [199.8553, None]):
         made.call("POST", calibrations, 201, average_memory=5, gauge_size=199.852, touches=touches, **limits)
     ring: dict[str, Any] = {"nominal": 30.0, "upper_deviation": 0.01, "lower_deviation": -0.01, "radius_term": 6.0}
     sections = [{"plus": 24.012, "minus": -23.988}] * 3

@@ -6,7 +6,7 @@ the first.
 
 from collections.abc import Sequence
 from datetime import UTC, datetime
-from itertools import pairwise
+from itertools import pairwise, takewhile
 from typing import Any
 
 from sqlalchemy import func, select
@@ -15,7 +15,19 @@ from sqlalchemy.orm import Session
 
 from app.access.audit.actions import record as audit
 from app.access.callers import Caller
-from app.core.calibration import Gauge, Outcome, Ring, Section, calibrate, centre, gauge_in_inches, ring_in_inches
+from app.core.calibration import (
+    Centring,
+    Gauge,
+    Outcome,
+    Ring,
+    Section,
+    calibrate,
+    centre,
+    diameter,
+    gauge_in_inches,
+    ring_in_inches,
+    untouched,
+)
 from app.core.decision.limits import nanometres
 from app.core.plausibility import empirical_value_warnings, offset_warnings
 from app.core.probing import TouchError
@@ -45,7 +57,7 @@ def _must_have(last: int, field: str, number: int) -> None:
 def calibrate_gauge(session: Session, machine: Machine, given: GaugeIn, caller: Caller) -> Created[CalibrationRow]:
     """Calibrate against a gauge (L92). A refused one is kept as well and changes nothing.
 
-    Raises `NotFound`; `Invalid` for limits out of order or a wrong count; `Conflict` for a key that was used otherwise.
+    Raises `NotFound`; `Invalid` for limits out of order or too many touches; `Conflict` for a key that was used otherwise.
     """
     lock_machines(session, [machine.id])
     _must_have(machine.average_locations, "average_memory", given.average_memory)
@@ -53,25 +65,36 @@ def calibrate_gauge(session: Session, machine: Machine, given: GaugeIn, caller: 
     place = Place("average", given.average_memory)
     gauge = _gauge(given)
     settings = given.model_dump(exclude={"touches", "calibrated_at", "key", "average_memory"}, exclude_none=True)
-    settings["repeats"] = len(given.touches)
+    settings["repeats"] = max(given.repeats or 1, len(given.touches))
     if (before := _sent_before(session, machine, place, given.key, settings, given.touches)) is not None:
         return before
-    if given.repeats is not None and given.repeats != len(given.touches):
+    if given.repeats is not None and given.repeats < len(given.touches):
         raise Invalid.at(
             "touches", wording.missing_touch(given.repeats, len(given.touches)), do=_("Send one touch per repeat.")
         )
     value = queries.value_of(session, machine, place)
+    touches = [touch for touch in given.touches if touch is not None]
+    if (at := untouched(given.touches, given.repeats)) is not None:
+        record = CalibrationRecord(
+            kind="gauge",
+            outcome=Outcome.NO_TOUCH,
+            settings=settings | {"at": at},
+            touches=given.touches,
+            size=gauge.size,
+            value_before=value,
+        )
+        return _keep(session, machine, place, record, given.calibrated_at, given.key, caller)
     average = queries.running_average(session, machine, place, value)
-    done = calibrate(gauge, given.touches, empirical_value=value, average=average)
+    done = calibrate(gauge, touches, empirical_value=value, average=average)
     if done.repeat is not None:
         settings["at"] = done.repeat
-    warnings = gauge_in_inches(gauge.size, given.touches, queries.known_sizes(session, machine, place))
+    warnings = gauge_in_inches(gauge.size, touches, queries.known_sizes(session, machine, place))
     warnings += [] if done.proposed is None else empirical_value_warnings(done.proposed)
     record = CalibrationRecord(
         kind="gauge",
         outcome=done.outcome,
         settings=settings | {"spread": done.spread} | _kept(warnings),
-        touches=given.touches,
+        touches=touches,
         size=done.size,
         measured=done.measured,
         difference=done.difference,
@@ -120,7 +143,9 @@ def calibrate_ring(session: Session, machine: Machine, given: RingIn, caller: Ca
     settings = given.model_dump(exclude={"sections", "calibrated_at", "key", "tool_memory"})
     settings |= {"smallest": round(smallest, 9), "largest": round(largest, 9)}
     touches = [[section.plus, section.minus] for section in given.sections]
-    exchanged = [at for at, section in enumerate(given.sections) if section.plus < section.minus]
+    exchanged = [
+        at for at, (plus, minus) in enumerate(touches) if plus is not None and minus is not None and plus < minus
+    ]
     if exchanged:
         wrong = _("the touch in +X lies below the one in −X: plus and minus are exchanged")
         fields = [FieldError(f"sections[{at}].plus", wrong) for at in exchanged]
@@ -132,27 +157,19 @@ def calibrate_ring(session: Session, machine: Machine, given: RingIn, caller: Ca
     if (before := _sent_before(session, machine, place, given.key, settings, touches)) is not None:
         return before
     value = queries.value_of(session, machine, place)
-    try:
-        done = centre(
-            Ring(smallest, largest, given.radius_term),
-            [Section(*touched) for touched in touches],
-            blocked=given.first_move_triggered,
-        )
-    except TouchError as error:
-        raise Invalid.at(
-            "sections",
-            _("{got} sections came, all inside the ring's limits; {expected} are needed").format(
-                got=error.got, expected=error.expected
-            ),
-            do=_("Touch the missing sections."),
-        ) from None
+    sections = [
+        Section(plus, minus)
+        for plus, minus in takewhile(lambda touched: None not in touched, touches)
+        if plus is not None and minus is not None
+    ]
+    done = _centred(Ring(smallest, largest, given.radius_term), sections, given, caller)
     settings |= {"diameters": list(done.diameters)}
     if done.section is not None:
         settings["at"] = done.section
     moves = done.correction is not None and nanometres(done.correction) != 0
     proposed = round(value + (done.correction or 0.0), 9) if moves else None
     known = queries.known_sizes(session, machine, place)
-    warnings = ring_in_inches(given.nominal, given.radius_term, [Section(*touched) for touched in touches], known)
+    warnings = ring_in_inches(given.nominal, given.radius_term, sections, known)
     warnings += [] if proposed is None else offset_warnings(value, proposed)
     record = CalibrationRecord(
         kind="ring",
@@ -166,6 +183,26 @@ def calibrate_ring(session: Session, machine: Machine, given: RingIn, caller: Ca
         proposed=proposed,
     )
     return _keep(session, machine, place, record, given.calibrated_at, given.key, caller)
+
+
+def _centred(ring: Ring, sections: Sequence[Section], given: RingIn, caller: Caller) -> Centring:
+    """Compute the result of the sections that were touched on both sides; one that is missing is a refused calibration.
+
+    Raises `Invalid` where a person has typed too few of them.
+    """
+    try:
+        return centre(ring, sections, blocked=given.first_move_triggered)
+    except TouchError as error:
+        if caller.kind == "person" and len(sections) == len(given.sections):
+            raise Invalid.at(
+                "sections",
+                _("{got} sections came, all inside the ring's limits; {expected} are needed").format(
+                    got=error.got, expected=error.expected
+                ),
+                do=_("Touch the missing sections."),
+            ) from None
+        measured = tuple(diameter(ring, section) for section in sections)
+        return Centring(Outcome.NO_TOUCH, measured, None, len(sections) + 1)
 
 
 def _kept(warnings: Sequence[CodedWarning]) -> dict[str, Any]:

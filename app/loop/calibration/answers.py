@@ -11,7 +11,7 @@ from app.loop.calibration.places import PlaceRow
 from app.loop.calibration.queries import CalibrationRow, Pair, Suggestion
 from app.loop.warnings.wording import sentence
 from app.web.fields import answer_from
-from app.web.warnings import Warnings, warnings_out
+from app.web.warnings import WarningOut, Warnings, warnings_out
 
 Status = Literal["refused", "unchanged", "proposed", "accepted", "overtaken"]
 State = Literal["overdue", "refused", "proposed", "due_soon", "calibrated", "never"]
@@ -25,7 +25,7 @@ class OutcomeReason(BaseModel):
         str,
         Field(
             description="within_zero_range, average_kept, averaged_difference, full_difference, centred, paired; refused: "
-            "window, probe_fault, not_a_bore, wrong_gauge."
+            "window, probe_fault, no_touch, not_a_bore, wrong_gauge."
         ),
     ]
     text: Annotated[str, Field(description="For people.")]
@@ -76,7 +76,7 @@ class CalibrationOut(BaseModel):
     key: str | None
     accepted: Accepted | None
     warnings: Annotated[
-        list[str],
+        list[WarningOut],
         Field(
             description="What may be wrong: inches sent as mm, values outside the ranges of the control's own cycle. With "
             "inches, or a value that no probe has, nothing is applied automatically."
@@ -113,7 +113,7 @@ def calibration_out(row: CalibrationRow, machine: str) -> CalibrationOut:
         accepted=None
         if acceptance is None
         else Accepted(at=acceptance.at, by=acceptance.actor, reason=acceptance.reason, automatic=acceptance.automatic),
-        warnings=wording.warnings(record),
+        warnings=warnings_out(wording.warnings(record), wording.warning_sentence),
     )
 
 

@@ -62,8 +62,8 @@ def calibrate_gauge(
 ) -> CalibrationOut:
     """Calibrate against a gauge of known size, as L92 does; R11 is the location whose empirical value is found.
 
-    From R36 on, and with a touch outside ±a, it is refused: that is kept and answered as `"status": "refused"`, and
-    changes nothing. Its result is applied after approval, or at once where the plan says so.
+    From R36 on, and with a touch outside ±a or missing (null), it is refused: that is kept and answered as
+    `"status": "refused"`, raises the alarm *calibration refused*, and changes nothing. Its result is applied after approval, or at once where the plan says so.
     """
     machine_row = machine_for(session, caller, machine, "operator")
     stored = actions.calibrate_gauge(session, machine_row, given, caller)
@@ -79,7 +79,8 @@ def calibrate_ring(
 ) -> CalibrationOut:
     """Calibrate the X offset of a probe in a ring on the spindle: three sections along Z, each touched in +X and −X.
 
-    Refused, kept, and without effect: a section outside the ring's limits, or a first move along Z that triggered.
+    Refused, kept, and without effect: a section outside the ring's limits or not touched on both sides, or a first move
+    along Z that triggered.
     """
     machine_row = machine_for(session, caller, machine, "operator")
     stored = actions.calibrate_ring(session, machine_row, given, caller)

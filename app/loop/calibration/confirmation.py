@@ -55,7 +55,7 @@ def _accept(session: Session, machine: Machine, place: Place, number: int) -> Qu
         raise NotFound(wording.no_such_page(), wording.go_to_overview())
     if row.status != "proposed":
         raise NotFound(*wording.cannot_accept(row))
-    sentences = [wording.sentence(row.record), *wording.warnings(row.record)]
+    sentences = [wording.sentence(row.record), *map(wording.warning_sentence, wording.warnings(row.record))]
     follows = [*sentences, *_sets(place, row.record.value_before, row.record.proposed)]
     return Question(_("Accept calibration {n}?").format(n=number), _("Accept"), follows, _reasons())
 

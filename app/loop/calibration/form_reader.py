@@ -30,10 +30,15 @@ def lengths(text: str | None) -> list[float | str | None]:
 
 
 def gauge(form: Mapping[str, str], location: int) -> dict[str, Any]:
-    """The form of a gauge calibration as the API's fields."""
+    """The form of a gauge calibration as the API's fields.
+
+    Raises `Invalid` without a touch: who types has forgotten it, and the probe is not to blame.
+    """
+    if not (touches := lengths(form.get("touches"))):
+        raise Invalid.at("touches", _("is empty; type a size in mm for each touch"))
     return {
         "average_memory": location,
-        "touches": lengths(form.get("touches")),
+        "touches": touches,
         **{name: length(form.get(name)) for name in NUMBERS},
         **{name: form.get(name) for name in KEPT if name != "tool_memory"},
         "tool_memory": whole(form.get("tool_memory")),

@@ -11,7 +11,8 @@ from starlette.responses import RedirectResponse
 from app.access.deps import Caller, Operator, Viewer, require
 from app.core.parameters import MOST_LOCATIONS
 from app.errors import Conflict, FieldError, Invalid, NotFound
-from app.loop.calibration import actions, confirmation, form_reader, pairs, places, queries, wording
+from app.loop.calibration import actions, confirmation, form_reader, pairs, places, queries, single, wording
+from app.loop.calibration.answers import calibration_out
 from app.loop.calibration.queries import Place
 from app.loop.calibration.schemas import CalibrationPlanIn, GaugeIn, PairIn, RingIn
 from app.loop.characteristics import queries as characteristics
@@ -91,6 +92,26 @@ def place_page(
     """One place: how it stands, its history, the pairs, and the form_reader."""
     message = confirmation.done(done, n) if done else None
     return _place(request, session, caller, machine, _of(memory, location), before=before, said=message)
+
+
+@router.get("/calibration/{machine}/{memory}/{location}/{number}", dependencies=[require("viewer")])
+def one(request: Request, session: SessionDep, machine: str, memory: str, location: int, number: int) -> Response:
+    """One calibration: R42 to R49, its touches, and what it was made with."""
+    machine_row, place = machine_named(session, machine), _of(memory, location)
+    row = queries.calibration(session, machine_row, number)
+    if (row.record.memory, row.record.location) != place:
+        raise NotFound(wording.no_such_page(), wording.go_to_overview())
+    return page(
+        request,
+        "calibration/calibration.html",
+        machine=machine_row,
+        place=place,
+        calibration=row,
+        results=single.results(row.record, calibration_out(row, machine_row.key).results),
+        single=single,
+        wording=wording,
+        address=address,
+    )
 
 
 def _of(memory: str, location: int) -> Place:

@@ -61,10 +61,16 @@ class GaugeIn(Body):
     ]
     gauge_size: Annotated[Length, Field(description="R32: size of the gauge, or where the surface or flank lies.")]
     touches: Annotated[
-        list[Length], Field(min_length=1, max_length=MOST_TOUCHES, description="One per repeat; their mean is R43.")
+        list[Length | None],
+        Field(
+            max_length=MOST_TOUCHES,
+            description="One per repeat; their mean is R43. null where the probe did not trigger: the calibration is refused, "
+            "which is kept and answered, with an alarm.",
+        ),
     ]
     repeats: Annotated[
-        int | None, Field(strict=True, ge=1, le=MOST_TOUCHES, description="R27; if said, so many touches must come.")
+        int | None,
+        Field(strict=True, ge=1, le=MOST_TOUCHES, description="R27; fewer touches are missing ones, more are 422."),
     ] = None
     surface: Annotated[
         Literal["free", "groove"], Field(description="On a free surface (R21 = 1, R23 = 0) or in a reference groove.")
@@ -105,8 +111,8 @@ class GaugeIn(Body):
 class RingSectionIn(Body):
     """Position of X (#5041) at the trigger, on both sides of one section of the ring."""
 
-    plus: Annotated[Length, Field(description="Touched in +X.")]
-    minus: Annotated[Length, Field(description="Touched in −X.")]
+    plus: Annotated[Length | None, Field(description="Touched in +X; null where the probe did not trigger.")]
+    minus: Annotated[Length | None, Field(description="Touched in −X; null where the probe did not trigger.")]
 
 
 class RingIn(Body):
@@ -127,7 +133,10 @@ class RingIn(Body):
     ]
     sections: Annotated[
         list[RingSectionIn],
-        Field(max_length=SECTIONS, description="Three along Z; fewer only if the last one lies outside the limits."),
+        Field(
+            max_length=SECTIONS,
+            description="Three along Z; fewer if the last one lies outside the limits, else one was not touched.",
+        ),
     ] = Field(default=[])
     first_move_triggered: Annotated[
         bool, Field(strict=True, description="The first move along Z triggered: it is not a bore.")

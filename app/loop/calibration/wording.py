@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 from app.core.calibration import Outcome
 from app.core.decision.step import rounded
 from app.core.pairs import Comparison
-from app.core.warning import of_stored
+from app.core.warning import CodedWarning, of_stored
 from app.language.i18n import _, ngettext
 from app.language.numbers import mm, um, um_limit
 from app.language.times import in_sentence
@@ -90,7 +90,7 @@ def values_of(record: CalibrationRecord) -> dict[str, Any]:
 
 def refusal(data: Mapping[str, Any]) -> str:
     """The reason for the refusal of a calibration."""
-    at, diameters = data.get("at"), data.get("diameters") or ()
+    at, diameters = data.get("at"), data.get("diameters")
     values = {
         "at": at,
         "window": mm(data.get("window"), 3),
@@ -98,7 +98,7 @@ def refusal(data: Mapping[str, Any]) -> str:
         "limit": um_limit(data.get("limit") or 0.0),
         "smallest": mm(data.get("smallest")),
         "largest": mm(data.get("largest")),
-        "diameter": mm(diameters[at - 1] if at and at <= len(diameters) else None),
+        "diameter": mm(diameters[at - 1] if at and diameters and at <= len(diameters) else None),
     }
     match data.get("outcome"):
         case Outcome.WINDOW:
@@ -107,6 +107,10 @@ def refusal(data: Mapping[str, Any]) -> str:
             text = _(
                 "The difference {left} has reached the confidence limit {limit}: the probe or the program is wrong."
             )
+        case Outcome.NO_TOUCH if diameters is None:
+            text = _("Touch {at} is missing: the probe did not trigger.")
+        case Outcome.NO_TOUCH:
+            text = _("Section {at} was not touched on both sides: the probe did not trigger.")
         case Outcome.NOT_A_BORE:
             text = _("The first move along Z triggered: it is not a bore.")
         case _:
@@ -156,15 +160,22 @@ RANGES = (
 """The ranges of the source's L92: R number, setting, lowest and highest value."""
 
 
-def warnings(record: CalibrationRecord) -> list[str]:
+def warnings(record: CalibrationRecord) -> list[CodedWarning]:
     """Return what may be wrong with a calibration: inches first, then values outside the ranges of the source's control."""
-    return [coded(warning) for warning in of_stored(record.settings.get("warnings", ()))] + [
-        _("{name} = {value} is outside the {low} to {high} of the control's own cycle.").format(
-            name=name, value=f"{value:g}", low=f"{low:g}", high=f"{high:g}"
-        )
+    return of_stored(record.settings.get("warnings", ())) + [
+        CodedWarning("outside_range", {"name": name, "value": value, "low": low, "high": high}, setting)
         for name, setting, low, high in RANGES
         if record.kind == "gauge" and (value := record.settings.get(setting)) is not None and not low <= value <= high
     ]
+
+
+def warning_sentence(warning: CodedWarning) -> str:
+    """Return a warning of `warnings` in words."""
+    if warning.code != "outside_range":
+        return coded(warning)
+    return _("{name} = {value} is outside the {low} to {high} of the control's own cycle.").format(
+        **{name: f"{value:g}" if isinstance(value, int | float) else value for name, value in warning.values.items()}
+    )
 
 
 def cannot_accept(row: CalibrationRow) -> tuple[str, str]:

@@ -214,7 +214,7 @@ def _calibrations(
     )
     for number, memory, location, at, received_at in rows:
         text = _("Calibration {n}").format(n=number)
-        link = f"/calibration/{machine.key}/{memory}s/{location}"
+        link = f"/calibration/{machine.key}/{'averages' if memory == 'average' else 'probes'}/{location}/{number}"
         yield _Happened(Event(at, CALIBRATION, text, link), None, received_at)
 
 

@@ -126,7 +126,10 @@ class TestGauge:
 
     def test_warns_of_what_the_control_itself_would_not_take(self, shop: Shop) -> None:
         made = calibrate(shop, averaging_limit=0.2, confidence_limit=5.0, weighting_factor=6.0)
-        assert [warning.partition(" ")[0] for warning in made["warnings"]] == ["R29", "R34", "R36"]
+        assert [(warning["code"], warning["field"]) for warning in made["warnings"]] == [
+            ("outside_range", name) for name in ("weighting_factor", "averaging_limit", "confidence_limit")
+        ]
+        assert [warning["text"].partition(" ")[0] for warning in made["warnings"]] == ["R29", "R34", "R36"]
 
 
 class TestInches:
@@ -144,7 +147,8 @@ class TestInches:
         """The last one is all in inches: the characteristic on R11 = 5 has 40 mm."""
         shop.call("PUT", f"/machines/{shop.machine}/averages/5/calibration-plan", acceptance="automatic")
         made = calibrate(shop, zero_range=0.0001, **more)
-        assert words in made["warnings"][0].replace("\xa0", " ")
+        assert words in made["warnings"][0]["text"].replace("\xa0", " ")
+        assert made["warnings"][0]["code"] == "looks_like_inches"
         assert made["status"] != "accepted"
         assert value(shop) == 0.0
         assert shop.call("GET", f"/machines/{shop.machine}/calibrations/1")["warnings"] == made["warnings"]
@@ -163,7 +167,7 @@ class TestInches:
     def test_a_ring(self, shop: Shop, more: dict[str, Any], words: str) -> None:
         made = ring(shop, **more)
         assert made["status"] == "refused"
-        assert words in made["warnings"][0].replace("\xa0", " ")
+        assert words in made["warnings"][0]["text"].replace("\xa0", " ")
 
     def test_a_ring_that_is_all_in_inches_is_held_against_the_one_before(self, shop: Shop) -> None:
         assert ring(shop)["warnings"] == []
@@ -174,13 +178,13 @@ class TestInches:
             "radius_term": 0.23622,
         }
         made = ring(shop, sections=[{"plus": 0.94539, "minus": -0.94451}] * 3, **inches)
-        assert "1.1811 mm looks like 30.0000 mm" in made["warnings"][0].replace("\xa0", " ")
+        assert "1.1811 mm looks like 30.0000 mm" in made["warnings"][0]["text"].replace("\xa0", " ")
 
     def test_a_value_that_no_probe_has_waits_for_a_person(self, shop: Shop) -> None:
         shop.call("PUT", f"/machines/{shop.machine}/averages/5/calibration-plan", acceptance="automatic")
         made = calibrate(shop, touches=[210.0], path_factor=50, confidence_limit=50)
         assert (made["status"], value(shop)) == ("proposed", 0.0)
-        assert "no probe measures so far off" in made["warnings"][0]
+        assert "no probe measures so far off" in made["warnings"][0]["text"]
 
 
 class TestRefused:
@@ -226,8 +230,8 @@ class TestRefused:
             ({"zero_range": 0.01}, "averaging_limit"),
             ({"averaging_limit": 1.0}, "confidence_limit"),
             ({"repeats": 2}, "touches"),
-            ({"touches": []}, "touches"),
-            ({"touches": [None]}, "touches[0]"),
+            ({"touches": ["199.852"]}, "touches[0]"),
+            ({"touches": None}, "touches"),
             ({"average_memory": 0}, "average_memory"),
             ({"average_memory": 21}, "average_memory"),
             ({"weighting_factor": 0.5}, "weighting_factor"),
@@ -239,6 +243,32 @@ class TestRefused:
         problem = calibrate(shop, 422, **more)
         assert problem["errors"][0]["field"] == field
         assert shop.call("GET", f"/machines/{shop.machine}/calibrations")["items"] == []
+
+    @pytest.mark.parametrize(
+        ("more", "at"),
+        [
+            ({"touches": [199.852, None, 199.853]}, 2),
+            ({"touches": [None]}, 1),
+            ({"touches": []}, 1),
+            ({"touches": [199.852], "repeats": 3}, 2),
+        ],
+    )
+    def test_a_missing_touch_is_a_refused_calibration_with_an_alarm(
+        self, shop: Shop, more: dict[str, Any], at: int
+    ) -> None:
+        good = calibrate(shop)["number"]
+        made = calibrate(shop, client=shop.machine_client, key="once", **more)
+        assert (made["status"], made["action"], made["reason"]["code"]) == ("refused", "stop", "no_touch")
+        assert made["touches"] == more["touches"]
+        assert (made["results"]["R43"], made["proposed"], made["settings"]["at"]) == (None, None, at)
+        (alarm,) = shop.alarms()
+        assert alarm["kind"] == "calibration_refused"
+        assert f"Touch {at} is missing: the probe did not trigger." in alarm["text"]
+        assert calibrate(shop, 200, client=shop.machine_client, key="once", **more) == made
+        figure = shop.admin.get(f"/api/v1/machines/{shop.machine}/averages/5/calibration-figure")
+        assert "Calibration refused" in figure.text
+        accept(shop, good)
+        assert value(shop) == 0.02
 
 
 class TestRing:
@@ -267,9 +297,16 @@ class TestRing:
         assert "same height" in wrong["reason"]["text"]
         assert "30.1000" in wrong["reason"]["text"]
 
-    def test_good_sections_must_be_three(self, shop: Shop) -> None:
-        problem = ring(shop, 422, sections=RING["sections"][:2])
-        assert "3 are needed" in problem["errors"][0]["message"]
+    def test_a_section_that_was_not_touched_is_refused_with_an_alarm(self, shop: Shop) -> None:
+        for sections, at in (
+            (RING["sections"][:2], 3),
+            ([], 1),
+            ([RING["sections"][0], RING["sections"][1] | {"minus": None}, RING["sections"][2]], 2),
+        ):
+            made = ring(shop, sections=sections)
+            assert (made["status"], made["action"], made["reason"]["code"]) == ("refused", "stop", "no_touch")
+            assert f"Section {at} was not touched on both sides" in made["reason"]["text"]
+            assert f"Section {at} was not touched" in shop.alarms()[0]["text"]
         swapped = [{"plus": section["minus"], "minus": section["plus"]} for section in RING["sections"]]
         told = ring(shop, 422, sections=[RING["sections"][0], *swapped[1:]])
         assert [each["field"] for each in told["errors"]] == ["sections[1].plus", "sections[2].plus"]

@@ -1,5 +1,7 @@
 """The pages of calibration: by links and posts, and in Chromium."""
 
+import re
+from html import unescape
 from typing import Any
 
 import pytest
@@ -32,6 +34,18 @@ def place(shop: Shop) -> str:
 
 def probe(shop: Shop) -> str:
     return f"/calibration/{shop.machine}/probes/32"
+
+
+def _cells(page: str) -> dict[str, list[str]]:
+    """The rows of the tables of a page by their first cell."""
+    rows = [
+        [
+            unescape(re.sub(r"<[^>]*>", "", cell)).strip().replace("\u00a0", " ")
+            for cell in re.findall(r"<td.*?</td>", row, re.DOTALL)
+        ]
+        for row in re.findall(r"<tr.*?</tr>", page, re.DOTALL)
+    ]
+    return {cells[0]: cells[1:] for cells in rows if cells}
 
 
 class TestWithoutScripts:
@@ -109,6 +123,8 @@ class TestWithoutScripts:
         assert "199.872</textarea>" in text
         text = operator.send(place(shop), 422, **(GAUGE | {"touches": "x", "gauge_size": ""}))
         assert "must be a number" in text or "Must be a number" in text
+        text = operator.send(place(shop), 422, **(GAUGE | {"touches": " "}))
+        assert "type a size in mm for each touch" in text
         assert shop.call("GET", f"/machines/{shop.machine}/calibrations")["items"] == []
 
     def test_a_refused_one_stands_on_the_page_with_its_reason(self, shop: Shop, operator: Person) -> None:
@@ -116,6 +132,33 @@ class TestWithoutScripts:
         assert "confidence limit" in text
         assert 'data-state="refused"' in text
         assert shop.alarms() == []  # who typed it sees it
+
+    def test_one_calibration_shows_what_l92_leaves(self, shop: Shop, operator: Person) -> None:
+        """R42 to R49, each touch, the settings; what it is not about stays on its own page."""
+        calibrate(shop, tool_memory=30, probe_type="radial")
+        calibrate(shop, touches=[199.852, None])
+        ring(shop)
+        history = operator.open(place(shop))
+        assert f'href="{place(shop)}/1"' in history
+        shown = _cells(operator.open(f"{place(shop)}/1"))
+        assert [shown[f"R{number}"] for number in (42, 43, 44, 46, 47, 49)] == [
+            ["size of the gauge", "199.8520 mm"],
+            ["measured, mean", "199.8720 mm"],
+            ["difference", "+20.0 µm"],
+            ["average memory location", "5"],
+            ["location of the probe's offset", "30"],
+            ["average of the difference", "+10.0 µm"],
+        ]
+        assert (shown["1"], shown["3"]) == (["199.8700 mm", "+18.0 µm"], ["199.8720 mm", "+20.0 µm"])
+        text = operator.open(f"{place(shop)}/1")
+        assert all(word in text for word in ("radial", "R36", "To be accepted", f'href="{place(shop)}/accept/1"'))
+        missing = operator.open(f"{place(shop)}/2")
+        assert _cells(missing)["2"] == ["no touch", "–"]
+        assert "Touch 2 is missing" in missing
+        ringed = _cells(operator.open(f"{probe(shop)}/3"))
+        assert (ringed["1"], ringed["R44"][1]) == (["24.0130 mm", "−23.9910 mm", "30.0020 mm"], "+12.0 µm")
+        for elsewhere in (f"{place(shop)}/3", f"{probe(shop)}/1", f"{place(shop)}/9", f"{place(shop)}/0"):
+            operator.open(elsewhere, 404)
 
     def test_the_ring_is_typed_in(self, shop: Shop, operator: Person) -> None:
         sections: dict[str, Any] = {
@@ -138,6 +181,8 @@ class TestWithoutScripts:
         assert "not a bore" in text
         text = operator.send(probe(shop), 422, **fields, plus_1="24.01")
         assert "Section 1, −X" in text
+        text = operator.send(probe(shop), 422, **fields, **{name: sections[name] for name in ("plus_1", "minus_1")})
+        assert "3 are needed" in text
         assert shop.call("GET", f"/machines/{shop.machine}/calibrations?tool_memory=32")["items"][-1]["number"] == 2
 
     def test_pairs_are_pasted_all_or_none_and_the_suggestion_is_accepted(self, shop: Shop, operator: Person) -> None:
