@@ -116,10 +116,10 @@ def test_no_tool_whose_corrections_act_is_ever_paused(runs: int) -> None:
     assert [outcome for _sigma, outcome, _sizes in lives(runs, 7) if outcome >= 0] == []
 
 
-@pytest.mark.parametrize(("gain", "share"), [(-1.0, 0.985), (-2.0, 0.98)])
+@pytest.mark.parametrize("gain", [-1.0, -2.0])
 @runs(1_000, 20_000)
-def test_a_wrong_sign_is_stopped_by_the_second_correction(runs: int, gain: float, share: float) -> None:
+def test_a_wrong_sign_is_stopped_by_the_second_correction(runs: int, gain: float) -> None:
     """The first that is larger than three standard deviations, and the one after it; 20 parts and more have shown the scatter."""
     began = [(outcome, sizes) for _sigma, outcome, sizes in lives(runs, 11, wrong=gain) if sizes[0] > 0]
     assert len(began) > 0.9 * runs
-    assert sum(0 <= outcome <= 2 for outcome, _sizes in began) >= share * len(began)
+    assert sum(0 <= outcome <= 2 for outcome, _sizes in began) >= 0.99 * len(began)

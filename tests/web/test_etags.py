@@ -31,7 +31,7 @@ def _fixture(shop: Shop, n: int) -> Edit:
         shop.call(
             "POST", "/work-zeros", 201, **BODIES["POST /api/v1/work-zeros"] | {"machine": shop.machine, "key": None}
         )
-    return f"/work-zeros/fixtures/{shop.machine}/vice", {"basis": "first", "warning": 0.01 * n}
+    return f"/work-zeros/fixtures/{shop.machine}/vice", {"basis": "first", "warning": 0.01 * n} | WHY
 
 
 def _study(shop: Shop, n: int) -> Edit:

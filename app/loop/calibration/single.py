@@ -1,4 +1,4 @@
-"""What the page of one calibration shows: the results that L92 leaves, the touches, and what it was made with."""
+"""The page of one calibration: the results that L92 leaves, the touches, and what it was made with."""
 
 from collections.abc import Iterator, Mapping
 from typing import Any, NamedTuple
@@ -61,7 +61,7 @@ def _touch(size: float | None) -> str:
 
 
 def settings(record: CalibrationRecord) -> Iterator[Fact]:
-    """What the calibration was made with, as far as it was said."""
+    """Settings of the calibration, as far as it has them."""
     said = record.settings
     for r, name in (
         *(("R27", "repeats"), ("R28", "path_factor"), ("R29", "weighting_factor")),
