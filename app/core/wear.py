@@ -1,4 +1,4 @@
-"""True wear behind a closed loop: the wear curve, wear per part with its uncertainty, and how long an edge will do.
+"""True wear behind a closed loop: the wear curve, and wear per part with its uncertainty.
 
 Compensation hides wear: sizes stay where they are and the offset moves instead. The *wear curve* puts the two together
 again. With D the deviation of a part and S the sum of the corrections that were in effect when it was cut, counted from
@@ -15,22 +15,13 @@ n (1 - rho) / (1 + rho), rho the lag-1 autocorrelation of the residuals (Santer 
 eq. 6; rho freed of its bias of -(2 + 4 rho)/n after Marriott and Pope 1954, Biometrika 41, 390). It assumes that
 scatter is of one size; an edge that breaks cannot be foretold. Readings are rounded, so the standard deviation about the line
 is at least that of rounding alone, step / sqrt(12) (GUM, JCGM 100:2008, F.2.2.1), with the smallest distance between two
-different readings as the step (`resolution_of`): readings exactly on a line know its slope no better than that.
-
-*Parts left* to a limit is where that line, continued, reaches it. Its interval has two sources. Fieller's (1954, J. R. Stat.
-Soc. B 16, 175), with the scatter of a single part added, is that of a line that goes on straight. Wear does not: an edge runs
-in, wears evenly, then faster (ISO 3685, the wear curve of a tool life). So both ends are moved apart by the factor
-
-    (1 + parts / seen) ** widening
-
-with `seen` the parts that the line was fitted over, `parts` those to the end of the straight interval: as far ahead again as
-was seen, wear may turn out half or twice as fast. `widening` is 1, and more where the forecasts of edges before missed by more (`backtest`, `widened`). Lengths are mm.
+different readings as the step (`resolution_of`): readings exactly on a line know its slope no better than that. `app.core.forecast` continues the line. Lengths are mm.
 """
 
 from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import StrEnum
-from math import ceil, inf, log, sqrt
+from math import sqrt
 from typing import NamedTuple
 
 import numpy as np
@@ -52,10 +43,6 @@ BREAK = 0.001  # so rarely scatter alone makes one line look like two
 OUTLIER = 5.0  # standard deviations from its neighbours
 STEP = 8.0  # standard deviations from one reading to the next
 NEAR = 5  # readings on either side of a step of the reference that say whether the parts moved
-MOST_AHEAD = 10.0  # times as far along the line as a part is ahead, `cone` looks
-LOOKS = (0.3, 0.5, 0.7, 0.9)  # of a tool life: where `backtest` makes a forecast of its end
-MOST_WIDENING = 4.0  # exponent from which on an interval says nothing
-SHORTEST_LIFE = 40  # readings of a tool life that a forecast is tested on
 
 
 class Step(NamedTuple):
@@ -120,14 +107,6 @@ class Fit:
         inflation = self.count / self.effective
         line = inflation * (1 / self.count + (ahead - self.centre) ** 2 / self.spread)
         return self.quantile * self.scatter * sqrt(line + (1.0 if single else 0.0))
-
-
-class Forecast(NamedTuple):
-    """Parts until the wear reaches a limit, with its 95 % interval; 0 = reached. high is inf where nobody can say."""
-
-    parts: float
-    low: float
-    high: float
 
 
 def wear(deviation: Values, compensated: Values, factor: float) -> Values:
@@ -198,7 +177,7 @@ def fit(sequence: NDArray[np.int64], curve: Values) -> Fit | None:
     """
     sequence, curve = sequence[-LONGEST:], curve[-LONGEST:]
     good = ~outliers(curve)
-    off = _off(curve[good])
+    off = off_of(curve[good])
     good[np.flatnonzero(good)[len(curve[good]) - off :]] = False
     x, y = sequence[good].astype(np.float64), curve[good]
     while len(x) * SHORTER >= SHORTEST and _breaks(x, y):
@@ -234,146 +213,6 @@ def fit(sequence: NDArray[np.int64], curve: Values) -> Fit | None:
     )
 
 
-def forecast(fit: Fit, limit: float, widening: float = 1.0) -> Forecast | None:
-    """Parts until w reaches `limit` (mm), one that lies the way that it wears; None where no wear is to be seen.
-
-    A limit that the line has passed already is reached: 0 parts. What broke tells nothing of what comes: None as well.
-    widening: exponent of the factor by which wear that does not go on straight widens the interval; see `Record`.
-
-    >>> w = np.arange(40) * 0.0001 + np.array([0.001, -0.001] * 20)
-    >>> f = forecast(fit(np.arange(1, 41), w), 0.0139)
-    >>> round(f.parts), round(f.low), round(f.high)
-    (105, 25, 825)
-    """
-    straight = _straight(fit, limit)
-    if straight is None:
-        return None
-    return Forecast(straight.parts, _sooner(fit, straight.low, widening), _later(fit, straight.high, widening))
-
-
-def cone(fit: Fit, ahead: Values, widening: float = 1.0) -> tuple[Values, Values]:
-    """Limits of the size of a part so many parts after the last, mm: with the slowest and with the fastest wear.
-
-    The same interval as that of `forecast`, seen from the parts: it comes to a limit after `low` and after `high` parts.
-
-    >>> line = fit(np.arange(1, 41), np.arange(40) * 0.0001 + np.array([0.001, -0.001] * 20))
-    >>> [ends.round(4).tolist() for ends in cone(line, np.array([0.0, 18.7]))]
-    [[0.0017, 0.0029], [0.006, 0.0098]]
-    """
-    straight = np.concatenate(([0.0], np.geomspace(0.01, MOST_AHEAD * max(float(ahead.max()), 1.0), 1_000)))
-    sooner = np.array([_sooner(fit, distance, widening) for distance in straight])
-    later = np.array([_later(fit, distance, widening) for distance in straight])
-    sign = 1.0 if fit.slope >= 0 else -1.0
-    slow, fast = np.interp(ahead, later, straight), np.interp(ahead, sooner, straight)
-    return (
-        np.array([fit.at(distance) - sign * fit.half_width(distance, single=True) for distance in slow]),
-        np.array([fit.at(distance) + sign * fit.half_width(distance, single=True) for distance in fast]),
-    )
-
-
-def _bending(fit: Fit, parts: float) -> float:
-    """By how much faster or slower than along the line wear may come so far."""
-    return 1 + parts / (fit.last - fit.first + 1)
-
-
-def _sooner(fit: Fit, parts: float, widening: float) -> float:
-    """The parts after which faster wear may be where the line is after `parts`; never fewer than for a nearer place."""
-    if widening > 1:
-        parts = min(parts, (fit.last - fit.first + 1) / (widening - 1))
-    return float(parts / _bending(fit, parts) ** widening)
-
-
-def _later(fit: Fit, parts: float, widening: float) -> float:
-    """The parts after which slower wear may only be where the line is after `parts`."""
-    return float(parts * _bending(fit, parts) ** widening)
-
-
-def _straight(fit: Fit, limit: float) -> Forecast | None:
-    """The forecast of wear that goes on along its line."""
-    if not fit.is_wear or fit.off:
-        return None
-    # (c + b u - L)^2 = T^2 (1 + v/n + v u^2 / Sxx) about the centre of the readings, u = parts - centre.
-    inflation, reach = fit.count / fit.effective, fit.quantile * fit.scatter
-    gap = fit.at(fit.centre) - limit
-    square = fit.slope**2 - reach**2 * inflation / fit.spread
-    half = fit.slope * gap
-    rest = gap**2 - reach**2 * (1 + inflation / fit.count)
-    parts = (limit - fit.level) / fit.slope
-    root = sqrt(max(0.0, half**2 - square * rest))
-    if square <= 0:
-        return Forecast(max(0.0, parts), 0.0, inf)
-    low, high = (-half - root) / square + fit.centre, (-half + root) / square + fit.centre
-    return Forecast(max(0.0, parts), max(0.0, low), max(0.0, high))
-
-
-class Record(NamedTuple):
-    """Record of earlier forecasts: number tested, on how many lives, and number whose interval held the true value.
-
-    widening: the exponent with which 95 % of them would have held it, never below 1; for `forecast` of the edge that is
-    in the machine. held counts the intervals as they are without it.
-    """
-
-    lives: int
-    tested: int
-    held: int
-    widening: float
-
-
-def backtest(lives: Sequence[tuple[NDArray[np.int64], Values]]) -> Record:
-    """Test forecasts on tool lives that are over: sequences and wear curve of each, ascending.
-
-    At several moments of a life its forecast of the level that it came to in the end is made from the readings until then,
-    and compared with the parts that it really took. Lives of fewer than `SHORTEST_LIFE` readings, and moments at which no
-    forecast would have been made, count for nothing.
-
-    >>> w = np.arange(200) * 0.0001 + np.array([0.001, -0.001] * 100)
-    >>> backtest([(np.arange(1, 201), w)])
-    Record(lives=1, tested=4, held=4, widening=1.0)
-    """
-    tested = held = counted = 0
-    needed: list[float] = []
-    for numbers, worn in lives:
-        if len(worn) < SHORTEST_LIFE:
-            continue
-        whole = len(worn) - _off(worn)  # an edge that broke in the end was worn until then
-        sequence, curve = numbers[:whole], worn[:whole]
-        end, limit = int(sequence[-1 - NEAR // 2]), float(np.median(curve[-NEAR:]))
-        before = tested
-        for share in LOOKS:
-            upto = int(len(curve) * share)
-            line = fit(sequence[:upto], curve[:upto])
-            straight = None if line is None else _straight(line, limit)
-            if line is None or straight is None or straight.parts <= 0:
-                continue
-            tested += 1
-            exponent = _needed(line, straight, float(end - line.last))
-            needed.append(exponent)
-            held += exponent <= 1
-        counted += tested > before
-    return Record(counted, tested, held, max(1.0, widened(needed)))
-
-
-def _needed(fit: Fit, straight: Forecast, truth: float) -> float:
-    """The exponent with which the interval just holds the truth; 0 where the straight one does."""
-    if straight.low <= truth <= straight.high:
-        return 0.0
-    if truth < straight.low:
-        return log(straight.low / truth) / log(_bending(fit, straight.low))
-    return log(truth / straight.high) / log(_bending(fit, straight.high))
-
-
-def widened(needed: Sequence[float]) -> float:
-    """The exponent that holds at least 95 % of what comes, by what was needed so far: the (n + 1) 0.95th smallest.
-
-    Of fewer than 19 it is the largest (split conformal prediction: Vovk et al. 2005, Algorithmic learning in a random
-    world); and never above `MOST_WIDENING`, from which on the interval says nothing.
-    """
-    if not needed:
-        return 1.0
-    place = min(len(needed), ceil((len(needed) + 1) * LEVEL))
-    return min(MOST_WIDENING, sorted(needed)[place - 1])
-
-
 class Towards(StrEnum):
     """The limit that wear reaches: R37 worn off, the end of the tolerance, or the tool's offset limit."""
 
@@ -404,7 +243,7 @@ def limits_of(parameters: Parameters, way: float, total: float, lifted: float = 
     return limits
 
 
-def _off(curve: Values) -> int:
+def off_of(curve: Values) -> int:
     """Number of newest readings after a step, `STEP` standard deviations high; none once they are enough for a line."""
     newest = np.abs(np.diff(curve[-FEWEST:]))
     steps = np.flatnonzero(newest > max(STEP * scatter_of(curve), 1e-9))

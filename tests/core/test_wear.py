@@ -1,20 +1,18 @@
-"""The wear curve, the line through it and the forecast, by hand and against planted wear."""
+"""The wear curve and the line through it, by hand and against planted wear."""
 
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from app.core.forecast import forecast
 from app.core.wear import (
     FEWEST,
     LONGEST,
     Fit,
     Step,
     Values,
-    backtest,
-    cone,
     fit,
-    forecast,
     joined,
     outliers,
     scatter_of,
@@ -183,108 +181,6 @@ def test_outliers_are_left_out_and_counted() -> None:
     assert found.slope == pytest.approx(0.0001, rel=0.1)
 
 
-# --- the forecast
-
-
-def test_the_forecast_reaches_the_limit_where_the_line_does() -> None:
-    found = fitted(line(100, 0.0001, 0.00001, seed=1))
-    told = forecast(found, 0.0199)
-    assert told is not None
-    assert told.parts == pytest.approx(100, abs=1)
-    assert told.low < told.parts < told.high
-
-
-def test_the_cone_comes_to_the_limit_after_the_parts_of_the_interval() -> None:
-    """Both ends: the chart and the number say the same, wider where edges before missed."""
-    found = fitted(line(60, -0.0002, 0.002, seed=3))
-    for widening in (1.0, 1.7):
-        told = forecast(found, -0.024, widening)
-        assert told is not None
-        slow, fast = cone(found, np.array([told.low, told.high]), widening)
-        assert fast[0] == pytest.approx(-0.024, rel=0.01)
-        assert slow[1] == pytest.approx(-0.024, rel=0.01)
-
-
-def test_wear_that_goes_on_straight_is_no_excuse_for_a_narrow_interval() -> None:
-    """As far ahead again as the line is long, wear may turn out half or twice as fast."""
-    told = forecast(fitted(line(100, 0.0001, 0.0000001, seed=1)), 0.0199)
-    assert told is not None
-    assert told.low == pytest.approx(50, rel=0.01)
-    assert told.high == pytest.approx(200, rel=0.01)
-
-
-def worn_edge(rng: np.random.Generator) -> tuple[Values, Values]:
-    """A tool life in shares of its limit, to twice its length: the truth, and what is measured of it.
-
-    By turns three phases (run-in, even wear, faster wear), a power of the time, a straight line, and a curve like those of
-    milling cutters in public data: half of the wear in the first tenth, nearly none, then the rest. Scatter 0.3 to 6 %.
-    """
-    parts = int(rng.integers(120, 1500))
-    t = np.arange(1, 2 * parts) / parts
-    kind = rng.integers(0, 4)
-    if kind == 0:
-        begin, power = rng.uniform(0.5, 0.9), rng.uniform(1.5, 3.0)
-        w = rng.uniform(0.05, 0.35) * (1 - np.exp(-t / rng.uniform(0.02, 0.15))) + rng.uniform(0.3, 0.7) * t
-        w += rng.uniform(0.1, 0.6) * (np.maximum(t - begin, 0) / (1 - begin)) ** power
-    elif kind == 1:
-        w = t ** rng.uniform(0.5, 2.2)
-    elif kind == 2:
-        w = t
-    else:
-        w = 0.45 * (1 - np.exp(-t / 0.1)) + 0.25 * t + 0.3 * np.maximum(0, (t - 0.6) / 0.4) ** 1.5
-    w = w / np.interp(1, t, w)
-    return w, w + rng.normal(0, rng.choice([0.003, 0.01, 0.03, 0.06]), len(w))
-
-
-def test_the_interval_holds_the_truth_of_wear_that_is_not_linear() -> None:
-    """The interval of the line alone held it in 43 % of such forecasts."""
-    rng = np.random.default_rng(11)
-    held = []
-    for _life in range(250):
-        truth, curve = worn_edge(rng)
-        reached = int(np.argmax(truth >= 1)) + 1
-        for share in rng.uniform(0.1, 0.97, 3):
-            now = int(reached * share)
-            found = fit(np.arange(1, now + 1), curve[:now])
-            told = None if found is None else forecast(found, 1.0)
-            if told is not None:
-                held.append(told.low <= reached - now <= told.high)
-    assert len(held) > 600
-    assert np.mean(held) >= 0.93
-
-
-def abrupt(parts: int, seed: int) -> Values:
-    """An edge that wears ten times as fast in the last tenth of its life."""
-    t = np.arange(1, parts + 1) / parts
-    curve: Values = (0.5 * t + 5 * np.maximum(0, t - 0.9)) + np.random.default_rng(seed).normal(0, 0.005, parts)
-    return curve
-
-
-def test_the_forecasts_of_edges_before_widen_the_next() -> None:
-    record = backtest([(np.arange(1, n + 1), abrupt(n, n)) for n in (150, 260, 340)])
-    assert record.lives == 3
-    assert record.held < record.tested
-    assert record.widening > 1
-    curve = abrupt(300, 1)
-    alone, taught = (forecast(fitted(curve[:240]), 0.95, widening) for widening in (1.0, record.widening))
-    assert alone is not None
-    assert taught is not None
-    assert alone.low > 60 >= taught.low
-
-
-def test_edges_that_tell_nothing_widen_nothing() -> None:
-    short = (np.arange(1, 21), line(20, 0.001, 0.0001, seed=1))
-    flat = (np.arange(1, 101), line(100, 0.0, 0.001, seed=1))
-    assert backtest([]) == backtest([short, flat]) == (0, 0, 0, 1.0)
-
-
-def test_an_edge_that_broke_in_the_end_is_judged_by_its_wear_until_then() -> None:
-    curve = line(200, 0.0001, 0.0005, seed=2)
-    whole = backtest([(np.arange(1, 201), curve)])
-    curve[-3:] += 0.4
-    assert backtest([(np.arange(1, 201), curve)]).held == whole.held == 4
-
-
 def test_readings_that_are_all_the_same_are_no_wear() -> None:
     """A hundred times 0.1 has a slope of 1e-19, and a scatter as small."""
     assert not fitted(np.full(100, 0.1)).is_wear
@@ -328,13 +224,3 @@ def test_no_interval_is_narrower_than_rounding_makes_it(step: float, slope: floa
     assert line.scatter >= step / np.sqrt(12) * (1 - 1e-6)
     low, high = line.slope_interval
     assert high - low >= 2 * 1.9 * step / np.sqrt(12 * line.spread)
-
-
-def test_no_wear_no_number() -> None:
-    assert forecast(fitted(line(60, 0.0, 0.001, seed=3)), 0.05) is None
-
-
-def test_a_limit_that_was_passed_is_reached() -> None:
-    told = forecast(fitted(line(100, 0.0001, 0.0001, seed=1)), 0.005)
-    assert told is not None
-    assert told.parts == told.low == 0

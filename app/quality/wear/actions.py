@@ -10,8 +10,9 @@ from sqlalchemy import Select, func, or_, select
 from sqlalchemy.dialects.postgresql import insert
 from sqlalchemy.orm import Session
 
+from app.core.forecast import Record
 from app.core.hunting import Hunting, LoopVerdict
-from app.core.wear import LONGEST, Record
+from app.core.wear import LONGEST
 from app.db.events import publish
 from app.jobs.actions import PeriodicJob, Unit
 from app.loop.alarms import actions as alarms
@@ -102,13 +103,12 @@ def _newest(session: Session, current: CurrentCharacteristic) -> Window:
     return Window(max(1, life.last - LONGEST + 1), life.last, life.newest)
 
 
-def _record(session: Session, current: CurrentCharacteristic, before: Outlook | None) -> tuple[int, Record | None]:
+def _record(session: Session, current: CurrentCharacteristic, before: Outlook | None) -> tuple[int, Record]:
     """Accuracy of the forecasts of earlier edges, and its tool change: computed once after each change."""
     changed = queries.life_of(session, current).first - 1
     if before is not None and before.record_of == changed:
         return changed, queries.record_of(before)
-    record = queries.backtested(session, current)
-    return changed, record if record.tested else None
+    return changed, queries.backtested(session, current)
 
 
 def _note(session: Session, wear: Wear, changed: int) -> None:
@@ -124,10 +124,10 @@ def _note(session: Session, wear: Wear, changed: int) -> None:
         "parts_high": forecast.high if forecast and finite else None,
         "hunting": (wear.hunting.state if wear.hunting else LoopVerdict.QUIET).value,
         "record_of": changed,
-        "lives": wear.record.lives if wear.record else None,
-        "tested": wear.record.tested if wear.record else None,
-        "held": wear.record.held if wear.record else None,
-        "widening": wear.record.widening if wear.record else None,
+        "lives": wear.record.lives,
+        "tested": wear.record.tested,
+        "held": wear.record.held,
+        "widening": wear.record.widening,
     }
     where = {"machine_id": wear.current.machine.id, "characteristic_id": wear.current.characteristic.id}
     row = insert(Outlook).values(**where, **values)

@@ -17,7 +17,7 @@ def chart_of(wear: Wear) -> WearChart:
         half=parameters.tolerance_width / 2,
         removed=wear.total / parameters.factor + wear.now.lifted,
         corrects=not parameters.measures_only,
-        widening=wear.record.widening if wear.record else 1.0,
+        widening=wear.record.widening,
     )
 
 

@@ -28,8 +28,9 @@ from app.charts import (
     nothing,
     reading_axis,
 )
-from app.core import wear
-from app.core.wear import Fit, Forecast, Towards
+from app.core import forecast
+from app.core.forecast import PUBLIC_WIDENING, Forecast
+from app.core.wear import Fit, Towards
 from app.language.i18n import _
 from app.language.numbers import um
 from app.quality.wear.wording import parts_left, per_part, towards_name
@@ -58,7 +59,7 @@ class Life:
 class WearChart:
     """Values to draw. half: of the tolerance; removed: what the corrections issued so far take out; limits lie on the wear curve.
 
-    widening: of the interval of the forecast, see `app.core.wear.Record`.
+    widening: of the interval of the forecast, see `app.core.forecast.Record`.
     """
 
     key: str
@@ -70,7 +71,7 @@ class WearChart:
     half: float
     removed: float
     corrects: bool
-    widening: float = 1.0
+    widening: float = PUBLIC_WIDENING
 
 
 def wear_figure(chart: WearChart, *, width: int = 1240) -> Chart:
@@ -84,7 +85,7 @@ def wear_figure(chart: WearChart, *, width: int = 1240) -> Chart:
     near = {
         name: chart.limits[name]
         for name, forecast in chart.forecasts.items()
-        if forecast.low <= ahead and not (chart.corrects and name is Towards.TOLERANCE)
+        if forecast.parts <= ahead and not (chart.corrects and name is Towards.TOLERANCE)
     }
     heights = [
         value
@@ -202,7 +203,7 @@ def _line(fit: Fit, ahead: float, widening: float, between: tuple[float, float])
     places = [ahead * step / STEPS for step in range(STEPS + 1)]
     low, high = (
         [min(max(_um(end), between[0]), between[1]) for end in ends.tolist()]
-        for ends in wear.cone(fit, np.array(places), widening)
+        for ends in forecast.cone(fit, np.array(places), widening)
     )
     cone = band(
         [fit.last + place for place in places],

@@ -18,10 +18,11 @@ from numpy.typing import NDArray
 from sqlalchemy import func, select, text
 from sqlalchemy.orm import Session
 
-from app.core import hunting, wear
+from app.core import forecast, hunting, wear
 from app.core.decision.limits import nanometres
+from app.core.forecast import NO_RECORD, Forecast, Record
 from app.core.hunting import Hunting, Settings
-from app.core.wear import Fit, Forecast, Record, Step, Towards, Values
+from app.core.wear import Fit, Step, Towards, Values
 from app.loop.characteristics.queries import CurrentCharacteristic
 from app.loop.summaries import queries as statistics
 from app.loop.summaries.queries import Window
@@ -105,7 +106,7 @@ class Wear:
     """The wear curve with what follows from it. `now`: the tool in the machine (its readings of the window); lives: those before.
 
     total: corrections issued since the tool change, mm of offset. changed_at: when it was changed. record: how the
-    forecasts of edges before came out; None where none was tested yet.
+    forecasts of edges before came out; `NO_RECORD` where none was tested yet.
     """
 
     current: CurrentCharacteristic
@@ -115,7 +116,7 @@ class Wear:
     total: float
     changed_at: datetime | None
     hunting: Hunting | None
-    record: Record | None = None
+    record: Record = NO_RECORD
 
     @cached_property
     def fit(self) -> Fit | None:
@@ -127,9 +128,8 @@ class Wear:
         """Parts left to each limit; empty where no wear is to be seen, or the window does not reach the present."""
         if self.fit is None or not self.fit.is_wear or not self.window.reaches_now:
             return {}
-        widening = self.record.widening if self.record else 1.0
-        forecasts = {name: wear.forecast(self.fit, limit, widening) for name, limit in self.limits.items()}
-        return {name: forecast for name, forecast in forecasts.items() if forecast is not None}
+        made = {name: forecast.forecast(self.fit, limit, self.record.widening) for name, limit in self.limits.items()}
+        return {name: each for name, each in made.items() if each is not None}
 
     @cached_property
     def limits(self) -> dict[Towards, float]:
@@ -141,11 +141,7 @@ class Wear:
     def first(self) -> tuple[Towards, Forecast] | None:
         """The limit that comes first while the loop does what it does now: a loop that corrects stays in its tolerance."""
         corrects = not self.current.parameters.measures_only
-        coming = [
-            (name, forecast)
-            for name, forecast in self.forecasts.items()
-            if not (corrects and name is Towards.TOLERANCE)
-        ]
+        coming = [(name, each) for name, each in self.forecasts.items() if not (corrects and name is Towards.TOLERANCE)]
         return min(coming, key=lambda each: each[1].parts, default=None)
 
 
@@ -226,11 +222,12 @@ def wear_of(session: Session, current: CurrentCharacteristic, window: Window, *,
     )
 
 
-def record_of(outlook: Outlook | None) -> Record | None:
-    """Accuracy of the forecasts of earlier edges, as the periodic job noted it; None where none was tested."""
+def record_of(outlook: Outlook | None) -> Record:
+    """Accuracy of the forecasts of earlier edges, as the periodic job noted it; `NO_RECORD` where none was tested."""
     if outlook is None or not outlook.tested or outlook.lives is None or outlook.held is None:
-        return None
-    return Record(outlook.lives, outlook.tested, outlook.held, outlook.widening or 1.0)
+        return NO_RECORD
+    widening = forecast.widening_after(outlook.lives, outlook.widening or 0.0)  # a note of an earlier version has less
+    return Record(outlook.lives, outlook.tested, outlook.held, widening)
 
 
 def backtested(session: Session, current: CurrentCharacteristic) -> Record:
@@ -238,9 +235,9 @@ def backtested(session: Session, current: CurrentCharacteristic) -> Record:
     changed = _stream(session, current).sequence_at_tool_change
     before = Window(max(1, changed - LIVES_LOOKED_BACK + 1), changed, changed)
     if not before.count:
-        return Record(0, 0, 0, 1.0)
+        return NO_RECORD
     lives = wear_of(session, current, before, singly=LIVES_LOOKED_BACK).lives
-    return wear.backtest([(life.sequence, life.worn) for life in lives])
+    return forecast.backtest([(life.sequence, life.worn) for life in lives])
 
 
 def _rows(session: Session, statement: str, where: dict[str, Any]) -> list[_Row]:
@@ -376,9 +373,8 @@ def next_event(outlook: Outlook | None) -> Coming | None:
     if outlook is None or outlook.towards is None or outlook.parts is None or outlook.parts > PLANNED:
         return None
     high = inf if outlook.parts_high is None else outlook.parts_high
-    forecast = Forecast(outlook.parts, outlook.parts_low or 0.0, high)
     return Coming(
-        wording.parts_left(forecast),
+        wording.parts_left(Forecast(outlook.parts, outlook.parts_low or 0.0, high)),
         wording.towards_parts(Towards(outlook.towards), reached=outlook.parts <= 0),
         outlook.parts <= NEAR,
     )

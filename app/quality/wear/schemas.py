@@ -7,8 +7,9 @@ from typing import Any, Literal
 from pydantic import BaseModel, Field
 
 from app.core.decision.step import rounded
+from app.core.forecast import ENOUGH, Forecast, Record
 from app.core.hunting import Hunting
-from app.core.wear import Fit, Forecast, Towards
+from app.core.wear import Fit, Towards
 from app.quality.wear import wording
 from app.quality.wear.queries import Wear
 from app.web.fields import answer_from
@@ -42,7 +43,7 @@ class ForecastOut(BaseModel):
     limit: float = Field(description="Where the limit lies on the wear curve.")
     parts: float
     low: float = Field(
-        description="95 % interval of a single part, with room for wear that does not go on evenly: from here on parts may lie beyond."
+        description="95 % interval of a single part, with room for run-in, even wear and a steep end: from here on parts may lie beyond."
     )
     high: float | None = Field(description="null: nobody can say how many at most.")
 
@@ -50,14 +51,19 @@ class ForecastOut(BaseModel):
 class RecordOut(BaseModel):
     """Accuracy of the forecasts of earlier edges: made at several moments of each life, for the level it came to."""
 
-    lives: int = Field(description="Tool lives that forecasts were tested on.")
+    lives: int = Field(description="Tool lives that forecasts were tested on; 0: none is over.")
     tested: int
     held: int = Field(
-        description="How many held the true number of parts in their interval, as it is without widening."
+        description="How many held the true number of parts in their interval, each as wide as the lives before it had taught."
     )
     widening: float = Field(
-        description="Exponent of (1 + parts / parts seen), by which both ends of the interval are moved; above 1 where forecasts missed."
+        description="Exponent of (3 + parts / parts seen) at the low end and of (1 + parts / parts seen) at the high end, by "
+        "which the interval is moved outwards."
     )
+    widened: bool = Field(
+        description=f"Whether fewer than {ENOUGH} lives are over, so that it is as wide as public wear series need, or wider."
+    )
+    text: str = Field(description="The meaning of the interval, and how often it held, in words.")
 
 
 class RemedyOut(BaseModel):
@@ -105,7 +111,7 @@ class WearOut(BaseModel):
     first: Literal["wear", "tolerance", "offset"] | None = Field(
         description="What comes first while the loop goes on as it does."
     )
-    record: RecordOut | None = Field(description="null where no edge before tells of it.")
+    record: RecordOut = Field(description="How often earlier forecasts held here, and how wide that makes the next.")
     hunting: HuntingOut | None = Field(description="null where nothing is corrected.")
 
     @classmethod
@@ -125,7 +131,7 @@ class WearOut(BaseModel):
                 for name, forecast in sorted(wear.forecasts.items(), key=lambda item: item[1].parts)
             ],
             first=wear.first[0].value if wear.first else None,
-            record=RecordOut(**wear.record._asdict()) if wear.record else None,
+            record=_record(wear.record),
             hunting=_hunting(wear.hunting, current.version.parameters),
         )
 
@@ -150,6 +156,11 @@ def _per_part(fit: Fit | None) -> PerPartOut | None:
 def _forecast(towards: Towards, limit: float, forecast: Forecast) -> ForecastOut:
     high = forecast.high if isfinite(forecast.high) else None
     return ForecastOut(towards=towards.value, limit=limit, parts=forecast.parts, low=forecast.low, high=high)
+
+
+def _record(record: Record) -> RecordOut:
+    text = wording.about_interval(record)
+    return RecordOut(**record._asdict(), widened=not record.is_enough, text=text)
 
 
 def _hunting(hunting: Hunting | None, settings: dict[str, Any]) -> HuntingOut | None:

@@ -30,7 +30,7 @@ class Outlook(Base):
     parts_low: Mapped[float | None]
     parts_high: Mapped[float | None]  # None: nobody can say how long at most
     hunting: Mapped[str]  # unknown, quiet, hunting or swinging
-    # How the forecasts of edges before came out (`app.core.wear.Record`); None until there was a tool change.
+    # How the forecasts of edges before came out (`app.core.forecast.Record`); None until there was a tool change.
     record_of: Mapped[int | None] = mapped_column(
         BigInteger
     )  # the tool change that it was worked out at, by its sequence

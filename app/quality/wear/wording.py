@@ -4,9 +4,10 @@ from collections.abc import Mapping
 from math import floor, inf, log10
 from typing import Any
 
+from app.core.forecast import ENOUGH, NO_RECORD, Forecast, Record
 from app.core.hunting import GOAL, Hunting, LoopVerdict, Remedy
 from app.core.parameters import Parameters
-from app.core.wear import FEWEST, Fit, Forecast, Record, Towards
+from app.core.wear import FEWEST, Fit, Towards
 from app.language.i18n import _, ngettext
 from app.language.numbers import NO_BREAK_SPACE, percent, plain_um, signed
 
@@ -118,21 +119,29 @@ def fit_note(fit: Fit) -> str:
     return " ".join(sentences)
 
 
-def about_interval(record: Record | None) -> str:
-    """The meaning of the interval of a forecast, and how often it was true of edges before."""
-    sentence = _(
-        "In brackets the 95 % interval. It allows for scatter, and for wear that does not go on evenly: as many parts ahead as the line is long, wear may turn out half or twice as fast."
-    )
-    if record is None:
-        return sentence + " " + _("Its accuracy is not known yet: no earlier edge.")
-    sentence += " " + ngettext(
-        "On %(lives)s earlier edge it contained the true number of parts in %(held)s of %(tested)s forecasts.",
-        "On %(lives)s earlier edges it contained the true number of parts in %(held)s of %(tested)s forecasts.",
+def held_of(record: Record) -> str:
+    """Number of earlier forecasts that held here; says too where none was made yet."""
+    if not record.tested:
+        return _("No forecast tested here yet: no earlier edge.")
+    return ngettext(
+        "%(held)s of %(tested)s forecasts held here, on %(lives)s earlier edge.",
+        "%(held)s of %(tested)s forecasts held here, on %(lives)s earlier edges.",
         record.lives,
     ) % {"lives": record.lives, "held": record.held, "tested": record.tested}
-    if record.widening > 1:
-        sentence += " " + _("It is wider now because of those that it missed.")
-    return sentence
+
+
+def about_interval(record: Record) -> str:
+    """The meaning of the interval of a forecast, how often earlier ones held, and what it is widened by."""
+    meaning = _(
+        "In brackets the interval that is meant to hold 95 % of the time. It allows for scatter, for wear that slows down as after a run-in, and for a steep end that may begin with the next part."
+    )
+    if record.is_enough:
+        width = _("It is as wide as these edges needed.")
+    else:
+        width = _("Until {n} edges are over it is as wide as wear series of other tools need, or wider.").format(
+            n=ENOUGH
+        )
+    return f"{meaning} {held_of(record)} {width}"
 
 
 def hunting_word(state: LoopVerdict | str) -> str:
@@ -256,7 +265,7 @@ class WearWords:
         first: tuple[Towards, Forecast] | None,
         hunting: Hunting | None,
         parameters: Parameters,
-        record: Record | None = None,
+        record: Record = NO_RECORD,
     ) -> None:
         self.slope = per_part(fit.slope) if fit is not None and fit.is_wear else None
         self.wear = wear_sentence(fit)
@@ -272,6 +281,7 @@ class WearWords:
             )
             for name, forecast in sorted(forecasts.items(), key=lambda item: item[1].parts)
         ]
+        self.held = held_of(record)
         self.about_interval = about_interval(record)
         data = hunting_data(hunting) if hunting is not None else None
         self.hunting = hunting_sentence(data) if data else None

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from app.charts import to_plotly
-from app.core.wear import Fit, Towards, fit, forecast
+from app.core.forecast import forecast
+from app.core.wear import Fit, Towards, fit
 from app.quality.wear.figures import Life, WearChart
 from app.quality.wear.figures import wear_figure as chart_of
 

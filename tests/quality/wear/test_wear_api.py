@@ -5,6 +5,7 @@ from typing import Any
 import pytest
 from sqlalchemy import select, text
 
+from app.core.forecast import ENOUGH, PUBLIC_WIDENING
 from app.jobs.actions import run_jobs
 from app.loop.tables.characteristics import Characteristic
 from app.quality.wear.actions import JOB
@@ -241,7 +242,9 @@ def test_of_a_very_long_life_older_readings_are_thinned_into_groups(shop: Shop) 
 
 def test_forecasts_are_tested_on_the_edges_before_and_told_with_what_comes(shop: Shop) -> None:
     """Two edges that wore faster in the end: the rounds test what would have been foretold, and page and API say so."""
-    assert of(shop)["record"] is None
+    none = of(shop)["record"]
+    assert (none["lives"], none["tested"], none["held"], none["widened"]) == (0, 0, 0, True)
+    assert none["widening"] == PUBLIC_WIDENING
     for edge in (1, 2):
         cut(shop, scatter(60, seed=edge, sigma=0.2, wear=0.2), delay=0)
         cut(shop, scatter(12, seed=edge + 10, sigma=0.2, wear=2.0, begin=12.0), delay=0)
@@ -251,7 +254,10 @@ def test_forecasts_are_tested_on_the_edges_before_and_told_with_what_comes(shop:
     told = of(shop)
     record = told["record"]
     assert record["lives"] == 2
-    assert 0 <= record["held"] < record["tested"] <= 8
-    assert record["widening"] > 1
+    assert 0 < record["held"] <= record["tested"] <= 8
+    assert record["widened"]
+    assert record["widening"] >= PUBLIC_WIDENING
+    assert f"{record['held']} of {record['tested']} forecasts held here, on 2 earlier edges." in record["text"]
+    assert f"Until {ENOUGH} edges are over" in record["text"]
     wear = next(each for each in told["forecasts"] if each["towards"] == "wear")
     assert wear["low"] < wear["parts"] / 2

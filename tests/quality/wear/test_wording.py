@@ -4,8 +4,8 @@ from math import inf
 
 import pytest
 
+from app.core.forecast import Forecast
 from app.core.hunting import Remedy
-from app.core.wear import Forecast
 from app.quality.wear.queries import NEAR, PLANNED, next_event
 from app.quality.wear.tables import Outlook
 from app.quality.wear.wording import parts_left, remedy_sentence

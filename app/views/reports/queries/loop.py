@@ -134,6 +134,8 @@ def wear(frame: Frame) -> Section | None:
         Fact(f"forecast_{at}", _("Parts to: {what}").format(what=name), words(parts), note=means)
         for at, (name, parts, means, _first) in enumerate(text.forecasts, start=1)
     ]
+    if text.forecasts:
+        facts.append(Fact("forecasts_held", _("Earlier forecasts"), words(text.held), note=text.about_interval))
     facts.append(Fact("corrected", _("Sum of the corrections of this tool"), deviation(study.total)))
     sentences = [text.wear, *([text.note] if text.note else [])]
     if text.hunting:
