@@ -4,7 +4,8 @@ The size of a feature when it is cut::
 
     size = target + bias + wears * recession(parts, chip) + warmth * theta + gain * offset + scatter
 
-`recession` grows quickly while a fresh edge runs in, then in proportion to the parts; a chip adds to it at once. `theta`
+`recession` grows quickly while a fresh edge runs in, then in proportion to the parts, and twice as fast near the end of its life; a
+chip adds to it at once. `theta`
 goes from 0 (cold) to 1 (warm) while the machine cuts and back while it stands. A part is measured some parts later.
 
 Every part draws the same number of random numbers whatever the server decides, so a machine with corrections and one
@@ -21,6 +22,7 @@ from app.cli.demo import plant
 WARM_UP = 45 * 60.0  # s, time constant while cutting
 COOL_DOWN = 80 * 60.0
 RUN_IN = 20.0  # parts
+STEEP_END = 0.85  # of the life of an edge: from there on it wears twice as fast
 SHIFT = 4 * 3600.0  # s of work between two breaks
 BREAK = 25 * 60.0
 NIGHT = 24 * 3600.0 - 2 * SHIFT - BREAK  # after two of them
@@ -45,7 +47,8 @@ class Edge:
     @property
     def recession(self) -> float:
         """Recession of the cutting edge, mm."""
-        return self.tool.run_in * (1 - exp(-self.parts / RUN_IN)) + self.tool.wear * self.parts + self.chip
+        steeply = max(0.0, self.parts - STEEP_END * self.tool.life)
+        return self.tool.run_in * (1 - exp(-self.parts / RUN_IN)) + self.tool.wear * (self.parts + steeply) + self.chip
 
     def correct(self, number: int, amount: float) -> float:
         """Change the offset, once per correction; the offset after it."""

@@ -361,11 +361,12 @@ def _since(versions: dict[int, dict[str, Any]]) -> int:
 
 
 class Coming(NamedTuple):
-    """Next event of a characteristic, in words, for a line of the plant's page."""
+    """Next event of a characteristic, in words, for a line of the plant's page. held: how many earlier forecasts held."""
 
     parts: str
     towards: str
     near: bool
+    held: str
 
 
 def next_event(outlook: Outlook | None) -> Coming | None:
@@ -377,4 +378,5 @@ def next_event(outlook: Outlook | None) -> Coming | None:
         wording.parts_left(Forecast(outlook.parts, outlook.parts_low or 0.0, high)),
         wording.towards_parts(Towards(outlook.towards), reached=outlook.parts <= 0),
         outlook.parts <= NEAR,
+        wording.held_of(record_of(outlook)),
     )

@@ -4,11 +4,11 @@ from math import inf
 
 import pytest
 
-from app.core.forecast import Forecast
+from app.core.forecast import NO_RECORD, PUBLIC_WIDENING, Forecast, Record
 from app.core.hunting import Remedy
-from app.quality.wear.queries import NEAR, PLANNED, next_event
+from app.quality.wear.queries import NEAR, PLANNED, next_event, record_of
 from app.quality.wear.tables import Outlook
-from app.quality.wear.wording import parts_left, remedy_sentence
+from app.quality.wear.wording import about_interval, parts_left, remedy_sentence
 
 SETTINGS = {"zero_range": 0.0002, "averaging_limit": 0.005, "weighting_factor": 1.0, "tolerance_width": 0.016}
 
@@ -27,6 +27,20 @@ def test_parts_left(forecast: Forecast, said: str) -> None:
     assert parts_left(forecast).replace("\xa0", " ") == said
 
 
+def test_the_interval_says_how_often_it_held_and_whose_width_it_has() -> None:
+    none, few, many = (about_interval(record) for record in (NO_RECORD, Record(1, 4, 3, 1.9), Record(9, 36, 35, 0.7)))
+    assert "No forecast tested here yet: no earlier edge. Until 8 edges are over" in none
+    assert "3 of 4 forecasts held here, on 1 earlier edge. Until 8 edges are over" in few
+    assert "35 of 36 forecasts held here, on 9 earlier edges. It is as wide as these edges needed." in many
+
+
+def test_a_note_of_an_earlier_version_is_widened_too() -> None:
+    """It learnt by a formula without a steep end, and had 1 where nothing was missed."""
+    old = Outlook(towards="wear", parts=100.0, hunting="quiet", lives=2, tested=8, held=8, widening=1.0)
+    assert record_of(old) == Record(2, 8, 8, PUBLIC_WIDENING)
+    assert record_of(None) == record_of(Outlook(lives=0, tested=0, held=0, widening=0.0)) == NO_RECORD
+
+
 def outlook(parts: float | None, high: float | None = 200.0, towards: str | None = "wear") -> Outlook:
     return Outlook(towards=towards, parts=parts, parts_low=10.0, parts_high=high, hunting="quiet")
 
@@ -42,6 +56,7 @@ def test_the_plant_page_is_quiet_about_what_is_far_and_marks_what_is_near() -> N
     assert near.near
     assert "more" in near.parts
     assert near.towards == "parts to R37"
+    assert near.held == "No forecast tested here yet: no earlier edge."
 
 
 @pytest.mark.parametrize(
