@@ -8,6 +8,7 @@ import httpx
 import pytest
 
 from tests.shop import Shop
+from tests.web.test_bad_input import BODIES, operations
 
 
 def tag(shop: Shop, path: str) -> str:
@@ -21,30 +22,90 @@ def edit(shop: Shop, method: str, path: str, body: dict[str, Any], if_match: str
     return shop.admin.request(method, f"/api/v1{path}", json=body, headers=headers)
 
 
-EDITS: dict[str, Callable[[Shop, int], tuple[str, str, dict[str, Any]]]] = {
-    "machine": lambda shop, n: ("PATCH", f"/machines/{shop.machine}", {"name": f"Lathe {n}"}),
-    "characteristic": lambda shop, n: (
-        *("PATCH", f"/characteristics/{shop.characteristic}"),
-        {"parameters": {"R29": 2 + n}, "reason": "tried"},
+Edit = tuple[str, dict[str, Any]]
+WHY = {"reason": "tried"}
+
+
+def _fixture(shop: Shop, n: int) -> Edit:
+    if n == 1:
+        shop.call(
+            "POST", "/work-zeros", 201, **BODIES["POST /api/v1/work-zeros"] | {"machine": shop.machine, "key": None}
+        )
+    return f"/work-zeros/fixtures/{shop.machine}/vice", {"basis": "first", "warning": 0.01 * n} | WHY
+
+
+def _study(shop: Shop, n: int) -> Edit:
+    body = {
+        name: value for name, value in BODIES["PUT /api/v1/gauge-studies/{study}"].items() if name != "seen_revision"
+    }
+    if n == 1:
+        made = {name: value for name, value in body.items() if name != "reason"} | {
+            "kind": "grr",
+            "machine": shop.machine,
+        }
+        shop.call("POST", "/gauge-studies", 201, **made)
+    study = shop.call("GET", f"/gauge-studies?machine={shop.machine}")["items"][-1]["id"]
+    return f"/gauge-studies/{study}", body | {"resolution": 0.0001 * (n + 1)}
+
+
+def _person(shop: Shop, n: int) -> Edit:
+    name = f"person-{shop.machine}"
+    if n == 1:
+        shop.server.person(name, "viewer")
+    person = next(each for each in shop.call("GET", "/people?limit=1000")["items"] if each["name"] == name)
+    return f"/people/{person['id']}", {"role": ("operator", "engineer")[n - 1]}
+
+
+EDITS: dict[str, Callable[[Shop, int], Edit]] = {
+    "PATCH /machines/{machine}": lambda shop, n: (f"/machines/{shop.machine}", {"name": f"Lathe {n}"}),
+    "PATCH /characteristics/{characteristic}": lambda shop, n: (
+        f"/characteristics/{shop.characteristic}",
+        {"parameters": {"R29": 2 + n}} | WHY,
     ),
-    "tool": lambda shop, n: ("PUT", f"/machines/{shop.machine}/tools/3", {"offset": 0.01 * n, "reason": "tried"}),
-    "sister": lambda shop, n: ("PATCH", f"/machines/{shop.machine}/tools/3", {"planned_parts": 100 + n}),
-    "average": lambda shop, n: (
-        *("PUT", f"/machines/{shop.machine}/averages/5"),
-        {"empirical_value": 0.001 * n, "reason": "tried"},
+    "PUT /characteristics/{characteristic}/rules": lambda shop, n: (
+        f"/characteristics/{shop.characteristic}/rules",
+        {"rules": {"main": {f"nelson_{n + 1}": "watch"}}} | WHY,
     ),
-    "kinematics": lambda shop, n: (
-        *("PUT", f"/machines/{shop.machine}/kinematics"),
-        {"max_modification": 0.1 * n, "reason": "tried"},
+    "PUT /machines/{machine}/tools/{tool}": lambda shop, n: (
+        f"/machines/{shop.machine}/tools/3",
+        {"offset": 0.01 * n} | WHY,
     ),
+    "PATCH /machines/{machine}/tools/{tool}": lambda shop, n: (
+        f"/machines/{shop.machine}/tools/3",
+        {"planned_parts": 100 + n},
+    ),
+    "PUT /machines/{machine}/averages/{location}": lambda shop, n: (
+        f"/machines/{shop.machine}/averages/5",
+        {"empirical_value": 0.001 * n} | WHY,
+    ),
+    "PUT /machines/{machine}/kinematics": lambda shop, n: (
+        f"/machines/{shop.machine}/kinematics",
+        {"max_modification": 0.1 * n} | WHY,
+    ),
+    "PUT /work-zeros/fixtures/{machine}/{fixture}": _fixture,
+    "PUT /gauge-studies/{study}": _study,
+    "PATCH /people/{person}": _person,
 }
 
 
-@pytest.mark.parametrize("kind", EDITS)
-def test_a_change_of_what_has_changed_since_is_412(shop: Shop, kind: str) -> None:
-    method, path, first = EDITS[kind](shop, 1)
-    _method, _path, second = EDITS[kind](shop, 2)
+def test_every_edit_that_takes_if_match_is_tried_here() -> None:
+    taking = {
+        operation.name.replace("/api/v1", "")
+        for operation in operations()
+        if any(parameter["name"].lower() == "if-match" for parameter in operation.declared.get("parameters", ()))
+    }
+    assert taking == set(EDITS)
+
+
+@pytest.mark.parametrize("operation", EDITS)
+def test_a_change_of_what_has_changed_since_is_412(shop: Shop, operation: str) -> None:
+    method = operation.partition(" ")[0]
+    path, first = EDITS[operation](shop, 1)
+    _path, second = EDITS[operation](shop, 2)
     seen = tag(shop, path)
+    for unknown in ('"other"', "other", f'{seen[:-2]}"', ""):
+        assert edit(shop, method, path, first, unknown).status_code == 412, unknown
+    assert tag(shop, path) == seen
     assert edit(shop, method, path, first, seen).status_code == 200
     stale = edit(shop, method, path, second, seen)
     assert stale.status_code == 412
@@ -56,12 +117,11 @@ def test_a_change_of_what_has_changed_since_is_412(shop: Shop, kind: str) -> Non
 
 
 def test_tags_of_proxies_lists_and_any(shop: Shop) -> None:
-    method, path, body = EDITS["machine"](shop, 1)
+    path, body = EDITS["PATCH /machines/{machine}"](shop, 1)
     seen = tag(shop, path)
-    assert edit(shop, method, path, body, '"other"').status_code == 412
-    assert edit(shop, method, path, body, "*").status_code == 200
+    assert edit(shop, "PATCH", path, body, "*").status_code == 200
     for if_match in (f"W/{tag(shop, path)}", f'"other", {tag(shop, path)}'):
-        assert edit(shop, method, path, body, if_match).status_code == 200
+        assert edit(shop, "PATCH", path, body, if_match).status_code == 200
     assert tag(shop, path) != seen
 
 
@@ -69,7 +129,7 @@ def test_of_two_who_edit_at_once_one_is_first(shop: Shop) -> None:
     seen = tag(shop, f"/characteristics/{shop.characteristic}")
 
     def change(n: int) -> int:
-        return edit(shop, *EDITS["characteristic"](shop, n), seen).status_code
+        return edit(shop, "PATCH", *EDITS["PATCH /characteristics/{characteristic}"](shop, n), seen).status_code
 
     with ThreadPoolExecutor(2) as pool:
         assert sorted(pool.map(change, (1, 2))) == [200, 412]
