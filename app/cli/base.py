@@ -128,10 +128,12 @@ def existing_url(settings: "Settings") -> Iterator[str]:
 
     Raises `InbandError` where there is none, or one of another version.
     """
-    from app.db.migrate import head, pending
+    from app.db.migrate import current, head, pending, wait_for_others
 
     refuse_nothing_there(settings)
     with reachable(settings) as url:
+        if current(url) != head():
+            wait_for_others(url)
         if refuse_empty(url) != head() and pending(url):
             raise InbandError(
                 "This database has the schema of an older Inband.",

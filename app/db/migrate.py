@@ -130,6 +130,12 @@ def _alone(url: str) -> Iterator[Connection]:
             raise MigrationError(words) from error
 
 
+def wait_for_others(url: str) -> None:
+    """Return once nobody migrates this database: a server that starts for the first time does. Raises `MigrationError`."""
+    with _alone(url):
+        pass
+
+
 def _driver(connection: Connection) -> psycopg.Connection[Any]:
     driver = connection.connection.driver_connection
     assert isinstance(driver, psycopg.Connection)

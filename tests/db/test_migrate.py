@@ -7,10 +7,13 @@ import pytest
 from sqlalchemy.exc import DBAPIError
 
 from app import HOUSE
+from app.cli.base import existing_url
 from app.db import migrate
 from app.db.migrate import MigrationError
+from app.settings import Settings
 from tests.conftest import NewDatabase, RunServer
 from tests.db.first_program import ADMIN_KEY, ANA, MACHINE_KEY, move
+from tests.waits import until
 
 
 def test_tables_and_migrations_say_the_same(new_database: NewDatabase) -> None:
@@ -224,6 +227,36 @@ def test_of_processes_that_start_together_one_migrates(empty_database: str) -> N
         done = list(pool.map(migrate.upgrade, [empty_database] * 4))
     assert sorted(map(len, done)) == [0, 0, 0, len(max(done))]
     assert migrate.current(empty_database) == migrate.head()
+
+
+def test_a_command_waits_for_the_server_that_migrates(new_database: NewDatabase) -> None:
+    """`inband key add` beside a first `inband serve`: no talk of an older Inband."""
+    url = new_database()
+    with (
+        psycopg.connect(url, autocommit=True) as server,
+        psycopg.connect(url, autocommit=True) as looking,
+        ThreadPoolExecutor(1) as pool,
+    ):
+        server.execute("SELECT pg_advisory_lock(%s)", [migrate.LOCK])
+        server.execute("UPDATE alembic_version SET version_num = '0090'")
+        command = pool.submit(_used, url)
+        until(
+            lambda: (
+                looking.execute(
+                    "SELECT count(*) FROM pg_locks WHERE locktype = 'advisory' AND NOT granted"
+                    " AND database = (SELECT oid FROM pg_database WHERE datname = current_database())"
+                ).fetchone()
+                == (1,)
+            )
+        )
+        server.execute("UPDATE alembic_version SET version_num = %s", [migrate.head()])
+        server.execute("SELECT pg_advisory_unlock(%s)", [migrate.LOCK])
+        assert command.result(60) == migrate.head()
+
+
+def _used(url: str) -> str | None:
+    with existing_url(Settings(database_url=url)) as found:
+        return migrate.current(found)
 
 
 def test_a_database_of_a_newer_program_is_left_alone(new_database: NewDatabase) -> None:
