@@ -304,4 +304,7 @@ def _sentence(words: str, place: str) -> str:
         return f"{path} is not known: look for a typing error."
     if missing := re.search(r"missing required field `(\w+)`", message):
         return f"{place}{where.rstrip('`')}.{missing[1]} is missing{MISSING.get(missing[1], '')}."
+    if wrong := re.search(r"nvalid enum value (.*)", message):
+        name = where.rstrip("`").rpartition(".")[2]
+        return f"{place}{where.rstrip('`')} = {wrong[1]} is not possible{MISSING.get(name, '')}."
     return f"{place}{where.rstrip('`')}: {message}."

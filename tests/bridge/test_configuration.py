@@ -74,7 +74,11 @@ def test_a_good_one() -> None:
         ("port = 7", 'port = "7"', "machine.lathe-1.tried.port: Expected `int`, got `str`."),
         ("port = 7", "prot = 7", "machine.lathe-1.tried.prot is not known: look for a typing error."),
         ('unit = "mm"', "", 'machine.lathe-1.unit is missing: "mm" or "inch", what'),
-        ('unit = "mm"', 'unit = "cm"', "machine.lathe-1.unit: Invalid enum value 'cm'."),
+        (
+            'unit = "mm"',
+            'unit = "cm"',
+            'machine.lathe-1.unit = \'cm\' is not possible: "mm" or "inch", what the control works in.',
+        ),
         ('secret = "one"', "", "needs one of secret, secret_file and secret_env"),
         ('secret = "one"', 'secret = "two words"', "machine.lathe-1.secret holds no key"),
         ('secret = "one"', 'secret_env = "INBAND_NOT_SET"', "the variable INBAND_NOT_SET is not set"),

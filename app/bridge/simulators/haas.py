@@ -58,6 +58,7 @@ class HaasSimulator:
             "unit": "inch" if self.model.unit == Unit.INCH else "mm",
             "secret_file": "machine.key",
             "identity": self.model.serial,
+            "proof_needed": False,
             "haas": {"address": "127.0.0.1", "port": self.port, "first_register": self.first},
             "characteristics": {str(each.number): f"characteristic-{each.number}" for each in self.model.features},
             "location": [
