@@ -48,6 +48,15 @@ def looks_like_inches(value: float, expected: float) -> bool:
     return value * expected > 0 and abs(value * INCH / expected - 1) < UNIT_SLACK
 
 
+def looks_like_micrometres(value: float, expected: float) -> bool:
+    """Return whether a value is the expected one in micrometres, both taken for mm.
+
+    >>> looks_like_micrometres(39998.1, 40.0), looks_like_micrometres(40.0, 40.0)
+    (True, False)
+    """
+    return value * expected > 0 and abs(value / expected / 1000 - 1) < UNIT_SLACK
+
+
 def inch_warnings(sizes: Iterable[tuple[str, float, float]]) -> list[CodedWarning]:
     """Return a warning for each field whose size is the expected one in inches, at most one a field.
 

@@ -54,7 +54,19 @@ Theme = Annotated[ThemeName, Depends(theme_of)]
 FIGURE: dict[int | str, dict[str, Any]] = {
     200: {
         "description": "A Plotly figure: `data` and `layout`",
-        "content": {"application/json": {"example": {"data": [], "layout": {}}}},
+        "content": {
+            "application/json": {
+                "schema": {
+                    "type": "object",
+                    "properties": {
+                        "data": {"type": "array", "items": {"type": "object"}, "description": "Traces."},
+                        "layout": {"type": "object", "description": "Axes, shapes, annotations."},
+                    },
+                    "required": ["data", "layout"],
+                },
+                "example": {"data": [], "layout": {}},
+            }
+        },
     }
 }
 

@@ -6,7 +6,7 @@ from typing import Any
 from app.core.decision.limits import Zone, nanometres, within_tolerance
 from app.core.decision.step import Code, average_of
 from app.core.parameters import Feature, Parameters
-from app.core.plausibility import looks_like_inches
+from app.core.plausibility import looks_like_inches, looks_like_micrometres
 from app.core.probing import TouchError, Touches, measured_value
 from app.language.i18n import _
 from app.loop.readings.records import MOST_OUTSTANDING, Record
@@ -53,6 +53,7 @@ def _notes(record: Record, parameters: Parameters, amount: float | None) -> tupl
             "target_in_inches",
             record.code in UNBELIEVABLE and looks_like_inches(parameters.target, record.measured),
         ),
+        ("micrometres", record.code in UNBELIEVABLE and looks_like_micrometres(record.measured, parameters.target)),
     )
 
 
@@ -214,6 +215,8 @@ def _note(code: str, record: Record, parameters: Parameters) -> str:
             }
         case "inches":
             return _("As inches the value would fit: readings are sent in mm.")
+        case "micrometres":
+            return _("As µm the value would fit: readings are sent in mm.")
         case "target_in_inches":
             return _("The target would fit as inches: parameters are in mm.")
         case "empirical_value":

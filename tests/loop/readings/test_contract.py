@@ -141,13 +141,16 @@ class TestZones:
         assert answer["correction"]["status"] == "pending"
         assert answer["reason"]["code"] == "tool_worn_released"
 
-    def test_of_a_probe_fault_that_fits_as_inches_the_reason_says_so(self, shop: Shop) -> None:
+    def test_of_a_probe_fault_that_fits_in_another_unit_the_reason_says_so(self, shop: Shop) -> None:
         shop.add("inches-d40", tool_memory=7, average_memory=7)
         fault = shop.call("POST", "/readings", 201, characteristic="inches-d40", measured=1.5748)
         assert fault["reason"]["notes"] == ["inches"]
         assert "As inches the value would fit" in fault["reason"]["text"]
+        fault = shop.call("POST", "/readings", 201, characteristic="inches-d40", measured=39998.1)
+        assert fault["reason"]["notes"] == ["micrometres"]
+        assert "As µm the value would fit" in fault["reason"]["text"]
         plain = shop.call("POST", "/readings", 201, characteristic="inches-d40", measured=3.0)
-        assert "inches" not in plain["reason"]["notes"]
+        assert plain["reason"]["notes"] == []
         shop.add("typed-in-inches", tool_memory=8, average_memory=8, target=1.5748)
         fault = shop.call("POST", "/readings", 201, characteristic="typed-in-inches", measured=40.0)
         assert fault["reason"]["notes"] == ["target_in_inches"]
