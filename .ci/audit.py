@@ -4,6 +4,7 @@ Ends with 1 where something is known, with 2 where nothing could be judged: no a
 """
 
 import json
+import re
 import subprocess
 import sys
 
@@ -23,7 +24,7 @@ def main() -> int:
     try:
         found = json.loads(ran.stdout)["dependencies"]
     except (ValueError, KeyError, TypeError):
-        print(f"Not judged: no database of known vulnerabilities could be reached.\n{ran.stderr.strip()[-300:]}")
+        print(f"Not judged: {_why_not(ran.stderr)}")
         return 2
     known = [(each["name"], each["version"], bug) for each in found for bug in each.get("vulns", ())]
     for name, version, bug in known:
@@ -36,6 +37,17 @@ def main() -> int:
         print(f"Not judged, {len(unknown)} of {len(found)}, which the database does not know: {', '.join(unknown)}")
     print(f"{len(found) - len(unknown)} judged, {len(known)} known vulnerabilities. PostgreSQL itself: inband check")
     return 1 if known else 0
+
+
+def _why_not(stderr: str) -> str:
+    """One sentence on why pip-audit gave no answer."""
+    last = " ".join((stderr.strip().splitlines() or ["it says nothing"])[-1].split())[:200]
+    if re.search(r"connect|resol|timed? ?out|retries|unreachable|proxy|ServiceError", stderr, re.IGNORECASE):
+        return (
+            "no database of known vulnerabilities can be reached from here, so nothing is known of any library; "
+            f"run make audit where pypi.org can be reached ({last})."
+        )
+    return f"pip-audit, which looks the libraries up, has failed ({last})."
 
 
 if __name__ == "__main__":

@@ -1,6 +1,7 @@
 """constraints.txt: complete, with a hash for each file, in sections that `make`, the Dockerfile and `make wheel` cut it into."""
 
 import re
+import runpy
 import shutil
 import subprocess
 import tomllib
@@ -63,3 +64,29 @@ def test_libraries_of_an_installation_are_those_of_the_server(tmp_path: Path) ->
     assert recipe is not None
     done = subprocess.run(["sh", "-c", recipe[1].replace("$$", "$")], cwd=HOUSE, capture_output=True, text=True)
     assert set(re.findall(r"^([a-z0-9-]+)==", done.stdout, re.MULTILINE)) == set(SECTIONS["For the server"])
+
+
+@pytest.mark.parametrize(
+    ("said", "sentence"),
+    [
+        (
+            "INFO\nrequests.exceptions.ConnectionError: Max retries exceeded\n",
+            (
+                "Not judged: no database of known vulnerabilities can be reached from here, so nothing is known of any library; run "
+                "make audit where pypi.org can be reached (requests.exceptions.ConnectionError: Max retries exceeded).\n"
+            ),
+        ),
+        (
+            "/usr/bin/python: No module named pip_audit\n",
+            "Not judged: pip-audit, which looks the libraries up, has failed (/usr/bin/python: No module named pip_audit).\n",
+        ),
+    ],
+)
+def test_an_audit_that_hears_nothing_says_so_in_one_sentence(
+    said: str, sentence: str, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    audit = runpy.run_path(str(HOUSE / ".ci" / "audit.py"))
+    unheard = subprocess.CompletedProcess[str]([], 1, stdout="", stderr=said)
+    monkeypatch.setattr(subprocess, "run", lambda *_command, **_how: unheard)
+    assert audit["main"]() == 2, "no answer is no clean bill"
+    assert capsys.readouterr().out == sentence

@@ -14,7 +14,8 @@ from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from app.access.callers import Caller
 from app.access.recognition import caller_of, device_at
-from app.errors import InbandError, NotAllowed, NotSignedIn
+from app.errors import InbandError, NotAllowed, NotSignedIn, TooLarge
+from app.language.i18n import _
 from app.web.deps import SAFE_METHODS
 from app.web.limits import DEFAULT, FORM, Takes, taken_by, too_large
 
@@ -26,6 +27,9 @@ def read_after_recognition(app: FastAPI) -> None:
 
 PIECE = 8000
 """Bytes of a form that are taken apart in one turn of the event loop: some milliseconds."""
+MOST_ESCAPED = 50_000
+"""Bytes of one field of a form that do not stand for themselves: all of it is made a text in one turn, some 15 ms."""
+_PLAIN = bytes(set(range(128)) - {ord("%")})
 
 
 class Allowance(NamedTuple):
@@ -145,6 +149,15 @@ async def _read(receive: Receive, allowance: Allowance, form: bool) -> Receive:
     if more:
         return _replayed(receive, [message])
     body = b"".join(parts)
+    if form and _escaped(body) > MOST_ESCAPED and any(_escaped(field) > MOST_ESCAPED for field in body.split(b"&")):
+        return _refusing(
+            TooLarge(
+                _("A field of the form holds more than {most} characters that are no plain letters.").format(
+                    most=MOST_ESCAPED
+                ),
+                _("Send it in several smaller requests."),
+            )
+        )
     size = PIECE if form else max(total, 1)
     pieces = [body[at : at + size] for at in range(0, total, size)] or [b""]
     last = len(pieces) - 1
@@ -152,6 +165,10 @@ async def _read(receive: Receive, allowance: Allowance, form: bool) -> Receive:
         receive,
         [{"type": "http.request", "body": piece, "more_body": at < last} for at, piece in enumerate(pieces)],
     )
+
+
+def _escaped(body: bytes) -> int:
+    return len(body.translate(None, _PLAIN))
 
 
 def _replayed(receive: Receive, messages: list[Message]) -> Receive:

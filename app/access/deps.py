@@ -22,6 +22,7 @@ from app.access.recognition import browser_of, caller_of, device_at
 from app.errors import NotAllowed, NotSignedIn
 from app.language.i18n import _
 from app.web.deps import MOST_FIELDS, SAFE_METHODS, SESSION_COOKIE, STATION_COOKIE
+from app.web.json_bodies import checked_first
 
 LONGEST_TOKEN = 400
 """Characters of a token that is looked at; ours have some 120."""
@@ -122,7 +123,11 @@ def require(role: Role) -> Any:
         caller.must(role)
         return caller
 
+    async def check(request: Request) -> None:
+        (await caller_of(request)).must(role)
+
     caller_with_role.__name__ = f"require_{role}"
+    checked_first(caller_with_role, check)
     return Depends(caller_with_role)
 
 

@@ -6,12 +6,13 @@ Python's reader takes NaN, doubled keys, half surrogates and numbers beyond any 
 import json
 import re
 from collections import Counter
-from collections.abc import Callable, Coroutine, Iterator
+from collections.abc import Awaitable, Callable, Coroutine, Iterator
 from itertools import islice
 from math import isfinite
 from typing import Any
 
 from fastapi import Request, Response
+from fastapi.dependencies.models import Dependant
 from fastapi.exceptions import RequestValidationError
 from fastapi.routing import APIRoute
 from starlette.concurrency import run_in_threadpool
@@ -141,6 +142,22 @@ def _wrong_text(text: str) -> str | None:
     return None
 
 
+Check = Callable[[Request], Awaitable[None]]
+_checks: dict[Callable[..., Any], Check] = {}
+
+
+def checked_first(dependency: Callable[..., Any], check: Check) -> None:
+    """Before a route that has this dependency says what is wrong with a request, this check may refuse its caller."""
+    _checks[dependency] = check
+
+
+def _checks_of(dependant: Dependant) -> Iterator[Check]:
+    for each in dependant.dependencies:
+        if each.call in _checks:
+            yield _checks[each.call]
+        yield from _checks_of(each)
+
+
 class _Read(Request):
     """A request whose JSON has been read already."""
 
@@ -151,26 +168,37 @@ class _Read(Request):
 
 
 class JsonRoute(APIRoute):
-    """A route that reads strictly: its query by `read_strictly`, its JSON body, if it takes one, by `read_json`."""
+    """A route that reads strictly: its query by `read_strictly`, its JSON body, if it takes one, by `read_json`.
+
+    Who may not use it hears that, and not what is wrong with the request.
+    """
 
     def get_route_handler(self) -> Callable[[Request], Coroutine[Any, Any, Response]]:
         handle = super().get_route_handler()
         known = known_parameters(self.dependant)
+        checks = list(_checks_of(self.dependant))
 
         async def handle_strictly(request: Request) -> Response:
-            if request.scope["query_string"] and ("authorization" in request.headers or request.cookies):
-                read_strictly(request, known)  # before anything is done; nobody learns of it without credentials
-            if self.body_field is None:
-                return await handle(request)
-            read = _Read(request.scope, request.receive)
-            body = await read.body()
-            if len(body) > ON_THE_LOOP:
-                read.value = await run_in_threadpool(self._read, body, request.headers.get("content-type"))
-            elif body:
-                read.value = read_json(body, request.headers.get("content-type"))
+            try:
+                if request.scope["query_string"] and ("authorization" in request.headers or request.cookies):
+                    read_strictly(request, known)  # before anything is done; nobody learns of it without credentials
+                read = request if self.body_field is None else await self._with_body(request)
+            except (Invalid, RequestValidationError):
+                for check in checks:
+                    await check(request)
+                raise
             return await handle(read)
 
         return handle_strictly
+
+    async def _with_body(self, request: Request) -> Request:
+        read = _Read(request.scope, request.receive)
+        body = await read.body()
+        if len(body) > ON_THE_LOOP:
+            read.value = await run_in_threadpool(self._read, body, request.headers.get("content-type"))
+        elif body:
+            read.value = read_json(body, request.headers.get("content-type"))
+        return read
 
     def _read(self, body: bytes, content_type: str | None) -> Any:
         """The value of a large body, as the route's own model already: to make one takes as long as reading."""

@@ -202,13 +202,14 @@ def _store_all(
     name: str,
 ) -> list[Result]:
     entries: list[tuple[Entry, Content, bool]] = []
-    taken: set[str] = set()
+    taken: dict[str, int] = {}
     if NEW in chosen.values():
-        taken = {each.characteristic.key for each in characteristic_queries.characteristics(session, limit=100_000)}
+        known = characteristic_queries.characteristics(session, limit=100_000)
+        taken = dict.fromkeys((each.characteristic.key for each in known), 1)
     for index, content in wanted.items():
         created = chosen[index] == NEW
         key = _set_up(session, content, machine, actor, taken) if created else chosen[index]
-        taken.add(key)
+        taken.setdefault(key, 1)
         key = characteristic_queries.characteristic_named(session, key).characteristic.key
         entry = queries.entry_of(session, key)
         assert entry is not None
@@ -247,7 +248,7 @@ def _store(
     return Result(content, entry.characteristic, created, summary, excluded, doubts)
 
 
-def _set_up(session: Session, content: Content, machine: str | None, actor: str, taken: set[str]) -> str:
+def _set_up(session: Session, content: Content, machine: str | None, actor: str, taken: dict[str, int]) -> str:
     if machine is None:
         raise Invalid.at("machine", _("say on which machine new characteristics are set up"))
     given = characteristics.CharacteristicIn(

@@ -191,8 +191,8 @@ def parameters_of(content: Content) -> dict[str, Any]:
     }
 
 
-def key_for(content: Content, taken: Iterable[str]) -> str:
-    """A key that is not taken, made of part, number and name."""
+def key_for(content: Content, taken: dict[str, int]) -> str:
+    """A key that is not taken, made of part, number and name; it is taken now. taken: keys, each with the last number behind it."""
     words = [content.part or content.part_name, content.number]
     if len(content.number) < 3:
         words.append(content.name)
@@ -200,10 +200,12 @@ def key_for(content: Content, taken: Iterable[str]) -> str:
         re.sub(r"[^a-z0-9._]+", "-", folded(word).replace(" ", "-")).strip("-._") for word in words if word
     )
     stem = re.sub(r"^[^a-z0-9]+", "", plain)[:58].strip("-") or f"aqdef-{content.index}"
-    others, number, key = set(taken), 1, stem
-    while key in others:
+    number, key = taken.get(stem, 1), stem
+    while key in taken:
         number += 1
         key = f"{stem}-{number}"
+    taken[stem] = number
+    taken.setdefault(key, 1)
     return key
 
 
@@ -213,34 +215,50 @@ def guessed(
     remembered: Mapping[tuple[str, str, str], str],
 ) -> dict[int, str]:
     """The key of the characteristic that each is here: as remembered, else the one of its part with its number or name."""
-    names: dict[str, list[CurrentCharacteristic]] = {}
+    names: dict[str, _Alike] = {}
     for current in known:
-        for name in {current.characteristic.key, current.characteristic.name}:
-            names.setdefault(folded(name), []).append(current)
+        part = folded(current.characteristic.part or "")
+        for name in {folded(current.characteristic.key), folded(current.characteristic.name)}:
+            names.setdefault(name, _Alike()).add(current.characteristic.key, part)
     chosen: dict[int, str] = {}
+    taken: set[str] = set()
     for content in found:
         if content.obstacle:
             continue
         key = remembered.get(content.identity) or _by_name(content, names)
-        if key and key not in chosen.values():
+        if key and key not in taken:
             chosen[content.index] = key
+            taken.add(key)
     return chosen
 
 
-def _is_of(current: CurrentCharacteristic, parts: set[str]) -> bool:
-    """Tell if it may be of one of these parts: two parts have a D40 each. Nothing said is no contradiction."""
-    own = current.characteristic.part
-    return not own or not parts or folded(own) in parts
+@dataclass
+class _Alike:
+    """Characteristics here that have one name, by their part: two parts have a D40 each. Their keys, two of each at most."""
 
+    of_part: dict[str, list[str]] = field(default_factory=dict)
+    of_any: list[str] = field(default_factory=list)
 
-def _by_name(content: Content, names: Mapping[str, Sequence[CurrentCharacteristic]]) -> str | None:
-    for word in filter(None, (content.number, content.name)):
-        parts = {folded(each) for each in (content.part, content.part_name) if each}
-        fitting = [each for each in names.get(folded(word), []) if _is_of(each, parts)]
+    def add(self, key: str, part: str) -> None:
+        for keys in [self.of_part.setdefault(part, []), *([self.of_any] if part else [])]:
+            if len(keys) < 2:  # of two none is chosen, as of a thousand
+                keys.append(key)
+
+    def the_one(self, parts: set[str]) -> str | None:
+        """The one that may be of these parts. Nothing said is no contradiction, but one of which it is said comes first."""
+        of_them = [key for part in parts for key in self.of_part.get(part, ())] if parts else self.of_any
+        fitting = [*of_them, *self.of_part.get("", ())]
         if len(fitting) > 1:
-            fitting = [each for each in fitting if each.characteristic.part]
-        if len(fitting) == 1:
-            return fitting[0].characteristic.key
+            fitting = of_them
+        return fitting[0] if len(fitting) == 1 else None
+
+
+def _by_name(content: Content, names: Mapping[str, _Alike]) -> str | None:
+    parts = {folded(each) for each in (content.part, content.part_name)} - {""}
+    for word in filter(None, (content.number, content.name)):
+        alike = names.get(folded(word))
+        if alike is not None and (key := alike.the_one(parts)) is not None:
+            return key
     return None
 
 
@@ -285,15 +303,16 @@ def said(text: str, found: Sequence[Content]) -> dict[int, str]:
 
 def named(pairs: Iterable[tuple[str, str]], found: Sequence[Content]) -> dict[int, str]:
     """Choices out of pairs of a name in the file, as `said` has it, and a key. Raises `ValueError` with a sentence."""
+    # By number and name, alone and with the part before it.
+    alone: dict[str, dict[int, Content]] = {str(each.index): {each.index: each} for each in found}
+    named_so: dict[str, dict[int, Content]] = {}
+    for each in found:
+        for word in (each.number, each.name):
+            for called in (word, f"{each.part}:{word}", f"{each.part_name}:{word}"):
+                named_so.setdefault(called, {})[each.index] = each
     chosen: dict[int, str] = {}
     for name, key in pairs:
-        part, _colon, own = name.rpartition(":")
-        fitting = [
-            each
-            for each in found
-            if (own in {each.number, each.name} and (not part or part in {each.part, each.part_name}))
-            or name in {each.number, each.name}
-        ] or [each for each in found if own == str(each.index) and not part]
+        fitting = list((named_so.get(name) or alone.get(name) or {}).values())
         if len(fitting) != 1:
             there = ", ".join(each.title for each in found[:20])
             reason = (
