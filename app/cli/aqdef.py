@@ -12,10 +12,9 @@ from app.language.i18n import _, ngettext
 from app.language.times import MINUTES, written
 
 if TYPE_CHECKING:
-    from datetime import datetime
-
     from sqlalchemy.orm import Session
 
+    from app.core.period import Period
     from app.db.engine import Database
     from app.loop.readings.importing.aqdef.actions import Outcome, Result
     from app.loop.readings.importing.aqdef.matching import Content
@@ -155,15 +154,14 @@ def export_file(
     keys: list[str],
     output: Path,
     *,
-    since: "datetime | None",
-    until: "datetime | None",
+    period: "Period",
     last: int | None,
 ) -> None:
     """Write readings of these characteristics, and say what was made to fit."""
     from app.access.audit import actions as audit
     from app.loop.readings.aqdef_export import write_aqdef
 
-    done = write_aqdef(session, keys, output, since=since, until=until, last=last)
+    done = write_aqdef(session, keys, output, period=period, last=last)
     for key in dict.fromkeys(keys):
         audit.record(
             session,

@@ -7,23 +7,30 @@ from contextlib import contextmanager, nullcontext
 from dataclasses import replace
 from enum import StrEnum
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Literal, TextIO
+from typing import TYPE_CHECKING, Annotated, Any, TextIO
 from zoneinfo import ZoneInfo
 
 import typer
 
 from app.cli import aqdef
 from app.cli.base import DatabaseUrl, DataDir, cli, existing, people, say, settings_from
-from app.errors import NotFound
+from app.errors import Invalid, NotFound
 from app.language.i18n import _, ngettext
 from app.language.times import MINUTES, in_zone, plant_zone, written
 
 if TYPE_CHECKING:
+    from datetime import datetime
+
+    from app.core.period import Period
     from app.loop.readings.importing.aqdef.sorting import Wishes as AqdefWishes
     from app.loop.readings.importing.cells import Flaw
     from app.loop.readings.importing.history import Flawed, Summary
     from app.loop.readings.importing.layout import Layout, Wishes
 
+SINCE, UNTIL = (
+    "Measured at this moment or later; a day begins at midnight.",
+    "Measured before this moment; a day is included, all of it.",
+)
 ALIKE = 3  # lines in a row with the same flaw that are named one by one
 
 
@@ -250,8 +257,8 @@ def export_file(
             envvar="INBAND_CHARACTERISTIC", help="The key of the characteristic; of AQDEF several, parted by commas."
         ),
     ],
-    since: Annotated[str | None, typer.Option("--from", envvar="INBAND_FROM", help="Measured at or after.")] = None,
-    until: Annotated[str | None, typer.Option("--to", envvar="INBAND_TO", help="Measured before.")] = None,
+    since: Annotated[str | None, typer.Option("--from", envvar="INBAND_FROM", help=SINCE)] = None,
+    until: Annotated[str | None, typer.Option("--to", envvar="INBAND_TO", help=UNTIL)] = None,
     last: Annotated[int | None, typer.Option(envvar="INBAND_LAST", min=1, help="Only so many, the last ones.")] = None,
     timezone: Zone = None,
     format_: Annotated[Format | None, typer.Option("--format", envvar="INBAND_FORMAT", show_default="csv")] = None,
@@ -267,7 +274,7 @@ def export_file(
     from app.loop.readings import exporting, queries
 
     zone = _zone(timezone)
-    first, end = _moment(since, zone, "--from", 0), _moment(until, zone, "--to", 0)
+    period = _period(since, until, zone)
     if format_ is Format.DFQ or (format_ is None and output is not None and output.suffix.lower() == ".dfq"):
         if output is None:
             raise typer.BadParameter(_("name the file: AQDEF is not written to standard output"), param_hint="--output")
@@ -277,7 +284,7 @@ def export_file(
             database.begin() as session,
             in_zone(zone),
         ):
-            aqdef.export_file(session, keys, output, since=first, until=end, last=last)
+            aqdef.export_file(session, keys, output, period=period, last=last)
         return
     lines_wanted = format_ is Format.NDJSON or (format_ is None and output is not None and output.suffix == ".ndjson")
     with (
@@ -287,7 +294,8 @@ def export_file(
         entry = queries.entry_of(session, characteristic)
         if entry is None:
             raise NotFound(_("There is no characteristic {key}.").format(key=repr(characteristic)))
-        exported = exporting.rows(session, entry, since=first, until=end, last=last)
+        ends = exporting.Ends()
+        exported = ends.of(exporting.rows(session, entry, period=period, last=last))
         with _output(output) as target, in_zone(zone):
             count = (exporting.write_ndjson if lines_wanted else exporting.write_csv)(exported, target)
         audit.record(
@@ -297,7 +305,9 @@ def export_file(
             f"characteristic/{characteristic}",
             after={"readings": count, "format": "ndjson" if lines_wanted else "csv"},
         )
-    say(ngettext("%(num)d reading written.", "%(num)d readings written.", count) % {"num": count})
+    text = ngettext("%(num)d reading written", "%(num)d readings written", count) % {"num": count}
+    with in_zone(zone):
+        say(f"{text}{_which(ends.numbers, ends.span)}.")
 
 
 def wishes_of(
@@ -384,12 +394,9 @@ def _sum_up(summary: "Summary", characteristic: str, *, live: bool, dry_run: boo
     text = _("{stored} readings of {characteristic}").format(stored=summary.stored, characteristic=characteristic)
     if dry_run and live:
         text = _("{lines} lines can be read").format(lines=summary.lines)
-    if summary.first_sequence is not None:
-        text += _(", numbers {first} to {last}").format(first=summary.first_sequence, last=summary.last_sequence)
-    if summary.first_at is not None and summary.last_at is not None:
-        span = f"{written(summary.first_at, MINUTES)} – {written(summary.last_at, MINUTES)} {plant_zone().key}"
-        text += _(", measured {span}").format(span=span)
-    say(f"{begin}{text}.", style="bold")
+    numbers = None if summary.first_sequence is None else (summary.first_sequence, summary.last_sequence)
+    span = (summary.first_at, summary.last_at) if summary.first_at is not None and summary.last_at is not None else None
+    say(f"{begin}{text}{_which(numbers, span)}.", style="bold")
     if summary.repeated:
         say(_("{count} were stored before and are not stored again.").format(count=summary.repeated))
     if summary.zones:
@@ -404,6 +411,17 @@ def _sum_up(summary: "Summary", characteristic: str, *, live: bool, dry_run: boo
         say(_("They are history: no correction, no alarm, and the running average stays as it was."))
 
 
+def _which(numbers: tuple[int, int | None] | None, span: "tuple[datetime, datetime] | None") -> str:
+    """The first and last of some readings, by number and by time, as a sentence goes on."""
+    text = ""
+    if numbers is not None:
+        text += _(", numbers {first} to {last}").format(first=numbers[0], last=numbers[1])
+    if span is not None:
+        moments = f"{written(span[0], MINUTES)} – {written(span[1], MINUTES)} {plant_zone().key}"
+        text += _(", measured {span}").format(span=moments)
+    return text
+
+
 def _zone(name: str | None) -> ZoneInfo:
     from app.files.formats import cell_values
 
@@ -413,13 +431,15 @@ def _zone(name: str | None) -> ZoneInfo:
         raise typer.BadParameter(str(error), param_hint="--timezone") from None
 
 
-def _moment(text: str | None, zone: ZoneInfo, option: str, fold: Literal[0, 1]) -> Any:
-    from app.files.formats import cell_values
+def _period(since: str | None, until: str | None, zone: ZoneInfo) -> "Period":
+    from app.files.formats import periods
 
+    typed = {"from": since or "", "to": until or ""}
     try:
-        return cell_values.moment(text, zone, fold=fold) if text else None
-    except cell_values.Unreadable as error:
-        raise typer.BadParameter(f"{text!r} {error}", param_hint=option) from None
+        return periods.period_of(typed, zone)
+    except Invalid as error:
+        wrong = error.errors[0]
+        raise typer.BadParameter(f"{typed[wrong.field]!r} {wrong.message}", param_hint=f"--{wrong.field}") from None
 
 
 @contextmanager

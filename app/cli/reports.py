@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from app.cli.base import DatabaseUrl, DataDir, cli, existing, people, say, settings_from
-from app.cli.data import Zone
+from app.cli.data import SINCE, UNTIL, Zone
 from app.errors import InbandError
 from app.files.documents.content import Format, Paper
 from app.language.i18n import _, ngettext
@@ -26,8 +26,8 @@ Keys = Annotated[list[str], typer.Argument(help="Keys of characteristics.", meta
 @cli.command("report")
 def report_files(
     characteristic: Keys,
-    since: Annotated[str | None, typer.Option("--from", envvar="INBAND_FROM", help="Measured at or after.")] = None,
-    until: Annotated[str | None, typer.Option("--to", envvar="INBAND_TO", help="Measured at or before.")] = None,
+    since: Annotated[str | None, typer.Option("--from", envvar="INBAND_FROM", help=SINCE)] = None,
+    until: Annotated[str | None, typer.Option("--to", envvar="INBAND_TO", help=UNTIL)] = None,
     last: Annotated[
         int | None,
         typer.Option(

@@ -1,41 +1,79 @@
-"""Choice of readings: by number, by time, or the last ones; the same fields in every API and page."""
+"""Choice of readings: by number, by time, or the last ones; the same fields in every API and page.
 
-from datetime import datetime
-from typing import Annotated, Literal, NamedTuple
+What a period means stands in `app.core.period`, how it is written in `app.files.formats.periods`.
+"""
+
+from functools import partial
+from typing import Annotated, Any, NamedTuple
 
 from fastapi import Depends, Query
+from pydantic import BeforeValidator, WithJsonSchema
+from pydantic_core import PydanticCustomError
 
+from app.core.period import ALWAYS, Period
 from app.errors import FieldError, Invalid
-from app.files.formats import cell_values
+from app.files.formats import cell_values, periods
 from app.language.i18n import _
 from app.language.times import plant_zone
 from app.web.fields import LARGEST_ID, Moment
 
 
 class Choice(NamedTuple):
-    """Chosen readings."""
+    """Chosen readings; `period`: of them those measured in it."""
 
-    last: int | None
-    first: int | None
-    through: int | None
-    start: datetime | None
-    end: datetime | None
+    last: int | None = None
+    first: int | None = None
+    through: int | None = None
+    period: Period = ALWAYS
+
+    @property
+    def everything(self) -> bool:
+        return self == Choice()
+
+    @property
+    def query(self) -> dict[str, Any]:
+        """The choice as an address says it."""
+        if self.everything:
+            return {"last": "all"}
+        named = {"last": self.last, "first": self.first, "through": self.through, **in_address(self.period)}
+        return {name: value for name, value in named.items() if value is not None}
 
 
-def _in_order(
-    last: str | None, first: int | None, through: int | None, start: datetime | None, end: datetime | None
-) -> Choice:
-    for name, low, high in (("first", first, through), ("from", start, end)):
-        if low is not None and high is not None and low > high:  # type: ignore[operator]
-            message = _("is beyond the end of the range; exchange the two")
-            raise Invalid(
-                f"{name}: {message}",
-                _("Correct the named fields and send it again."),
-                errors=[FieldError(name, message)],
-            )
-    if last is None and all(value is None for value in (first, through, start, end)):
-        return Choice(200, None, None, None, None)
-    return Choice(None if last in (None, "all") else int(last), first, through, start, end)
+def _day(value: Any, *, end: bool) -> Any:
+    """A day that is written as one; a moment is left as it is."""
+    day = cell_values.day(value) if isinstance(value, str) else None
+    try:
+        return value if day is None else periods.begin_of(day, plant_zone(), 1 if end else 0)
+    except cell_values.Unreadable as error:
+        raise PydanticCustomError("moment", str(error)) from None
+
+
+_WRITTEN = WithJsonSchema({"anyOf": [{"type": "string", "format": name} for name in ("date-time", "date")]})
+Beginning = Annotated[Moment, BeforeValidator(partial(_day, end=False)), _WRITTEN]
+"""Where a period begins: a moment with its offset, or a day of the plant."""
+Ending = Annotated[Moment, BeforeValidator(partial(_day, end=True)), _WRITTEN]
+"""Where a period ends: before a moment with its offset, or with a day of the plant, itself included."""
+BEGINNING = "From this moment on, with its offset; a day such as 2026-03-05 begins at midnight by the plant's clock."
+ENDING = "Before this moment, which does not belong to the period itself; a day such as 2026-03-05 does, all of it."
+
+
+def period_in_query(
+    start: Annotated[Beginning | None, Query(alias="from", description=BEGINNING, examples=[None])] = None,
+    end: Annotated[Ending | None, Query(alias="to", description=ENDING, examples=[None])] = None,
+) -> Period:
+    """The period that a program asks for."""
+    return periods.in_order(Period(start, end))
+
+
+InPeriod = Annotated[Period, Depends(period_in_query)]
+
+
+def period_on_page(
+    start: Annotated[str, Query(alias="from", max_length=64)] = "",
+    end: Annotated[str, Query(alias="to", max_length=64)] = "",
+) -> Period:
+    """The same in the address of a page: a moment without an offset is one of the plant's clock."""
+    return periods.period_of({"from": start, "to": end})
 
 
 Last = Annotated[
@@ -45,45 +83,41 @@ First = Annotated[int | None, Query(ge=1, le=LARGEST_ID, description="From this 
 Through = Annotated[int | None, Query(ge=1, le=LARGEST_ID, description="To this reading, itself included.")]
 
 
-def chosen(
-    last: Last = None,
-    first: First = None,
-    through: Through = None,
-    start: Annotated[Moment | None, Query(alias="from", description="Measured at this moment or later.")] = None,
-    end: Annotated[Moment | None, Query(alias="to", description="Measured at this moment or earlier.")] = None,
-) -> Choice:
+def _choice(last: str | None, first: int | None, through: int | None, period: Period) -> Choice:
+    if first is not None and through is not None and first > through:
+        message = _("is beyond the end of the range; exchange the two")
+        raise Invalid(
+            f"first: {message}",
+            _("Correct the named fields and send it again."),
+            errors=[FieldError("first", message)],
+        )
+    if last is None and first is None and through is None and not period.bounded:
+        return Choice(200)
+    return Choice(None if last in (None, "all") else int(last), first, through, period)
+
+
+def chosen(period: InPeriod, last: Last = None, first: First = None, through: Through = None) -> Choice:
     """The readings by number, by time, or the last ones; the last 200 if nothing is said."""
-    return _in_order(last, first, through, start, end)
+    return _choice(last, first, through, period)
 
 
 def chosen_on_page(
+    period: Annotated[Period, Depends(period_on_page)],
     last: Last = None,
     first: First = None,
     through: Through = None,
-    start: Annotated[str, Query(alias="from", max_length=64)] = "",
-    end: Annotated[str, Query(alias="to", max_length=64)] = "",
 ) -> Choice:
-    """The same in the address of a page: a moment without an offset is one of the plant's clock."""
-    return _in_order(last, first, through, _moment("from", start, 0), _moment("to", end, 1))
-
-
-def _moment(name: str, typed: str, fold: Literal[0, 1]) -> datetime | None:
-    try:
-        return cell_values.moment(typed, plant_zone(), fold=fold) if typed.strip() else None
-    except cell_values.Unreadable as error:
-        raise Invalid.at(name, str(error), do=_("Correct the named fields and send it again.")) from None
+    """The same in the address of a page."""
+    return _choice(last, first, through, period)
 
 
 Chosen = Annotated[Choice, Depends(chosen)]
 ChosenOnPage = Annotated[Choice, Depends(chosen_on_page)]
 
 
-def check_order(start: datetime | None, end: datetime | None) -> None:
-    """Raises `Invalid` when from … to runs backwards."""
-    if start is not None and end is not None and start > end:
-        message = _("{start} is later than `to` {end}").format(start=start.isoformat(), end=end.isoformat())
-        raise Invalid(
-            _("`from` {message}.").format(message=message),
-            _("Exchange the two moments."),
-            errors=[FieldError("from", message)],
-        )
+def in_address(period: Period) -> dict[str, str | None]:
+    """The period as an address says it."""
+    return {
+        "from": period.start.isoformat() if period.start else None,
+        "to": period.end.isoformat() if period.end else None,
+    }

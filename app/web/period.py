@@ -4,12 +4,14 @@ from collections.abc import Mapping
 from datetime import UTC, datetime, timedelta
 from typing import NamedTuple
 
-from app.files.formats import cell_values
+from app.core.period import Period
+from app.files.formats import cell_values, periods
 from app.language.i18n import _
 from app.language.times import begin_of_day, begin_of_shift, local, plant_zone
+from app.web.choice import in_address
 
 
-class Period(NamedTuple):
+class UsualPeriod(NamedTuple):
     """One to choose: without an end it goes on. key: its name in a form."""
 
     key: str
@@ -20,7 +22,7 @@ class Period(NamedTuple):
     @property
     def query(self) -> dict[str, str | None]:
         """The period as an address says it."""
-        return {"from": self.start.isoformat(), "to": self.end.isoformat() if self.end else None}
+        return in_address(Period(self.start, self.end))
 
     @property
     def choice(self) -> tuple[str, str]:
@@ -31,18 +33,18 @@ class Period(NamedTuple):
         return (self.start, self.end) == (start, end)
 
 
-def usual_periods(tool_since: datetime | None = None, now: datetime | None = None) -> list[Period]:
+def usual_periods(tool_since: datetime | None = None, now: datetime | None = None) -> list[UsualPeriod]:
     """The periods that every page offers. tool_since: the first reading of the tool in the machine."""
     now = now or datetime.now(UTC)
     today, monday = begin_of_day(now), begin_of_day(now, -local(now).weekday())
-    tool = [] if tool_since is None else [Period("tool", _("This tool"), local(tool_since))]
+    tool = [] if tool_since is None else [UsualPeriod("tool", _("This tool"), local(tool_since))]
     return [
-        Period("shift", _("This shift"), begin_of_shift(now)),
-        Period("today", _("Today"), today),
-        Period("yesterday", _("Yesterday"), begin_of_day(now, -1), today),
+        UsualPeriod("shift", _("This shift"), begin_of_shift(now)),
+        UsualPeriod("today", _("Today"), today),
+        UsualPeriod("yesterday", _("Yesterday"), begin_of_day(now, -1), today),
         *tool,
-        Period("week", _("This week"), monday),
-        Period("last-week", _("Last week"), begin_of_day(monday, -7), monday),
+        UsualPeriod("week", _("This week"), monday),
+        UsualPeriod("last-week", _("Last week"), begin_of_day(monday, -7), monday),
     ]
 
 
@@ -65,7 +67,10 @@ def field(moment: datetime | str | None, *, end: bool = False) -> str:
     """
     if isinstance(moment, str):
         try:
-            at = local(cell_values.moment(moment, plant_zone(), fold=1 if end else 0)).replace(tzinfo=None)
+            read = periods.bound(moment, plant_zone(), end=end)
+            if read is None:
+                return ""
+            at = local(read).replace(tzinfo=None)
         except cell_values.Unreadable:
             return _as_typed(moment)
     elif moment is None:

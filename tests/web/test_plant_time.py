@@ -4,8 +4,10 @@ import csv
 import io
 import re
 from collections.abc import Iterator
-from datetime import UTC, datetime
+from datetime import UTC, date, datetime, time, timedelta
+from statistics import fmean
 from typing import Any
+from urllib.parse import urlencode
 from zoneinfo import ZoneInfo
 
 import openpyxl
@@ -15,8 +17,10 @@ from playwright.sync_api import Page, expect
 from app.language.times import in_zone
 from app.loop.readings import exporting
 from app.loop.readings import queries as readings
+from app.views.reports.jobs_schemas import ReportsIn
 from app.web.period import field, usual_periods
 from tests.conftest import RunServer, Server
+from tests.forked import inband
 from tests.shop import Person, Shop
 
 # 02:30 is there twice in Berlin that night.
@@ -100,9 +104,13 @@ def test_exports_have_local_time_with_its_offset(berlin: Shop) -> None:
 @pytest.mark.parametrize(
     ("begin", "end", "count"),
     [
-        ("2026-10-25 02:30", "2026-10-25 02:30", 2),  # an end that is there twice means the later one
+        (
+            "2026-10-25 02:30",
+            "2026-10-25 02:30",
+            1,
+        ),  # an end that is there twice means the later one, and is not included
         ("2026-10-25 03:00", "2026-10-25 04:00", 1),
-        ("2026-10-25T00:30Z", "2026-10-25T00:30Z", 1),
+        ("2026-10-25T00:30Z", "2026-10-25T00:31Z", 1),
     ],
 )
 def test_periods_are_typed_in_plant_time(berlin: Shop, viewer: Person, begin: str, end: str, count: int) -> None:
@@ -200,3 +208,161 @@ def test_a_usual_period_is_chosen_without_script_too(berlin: Shop, viewer: Perso
         days.append(yesterday())  # another one, if it was midnight in between
         shown = {name: re.findall(rf'name="{name}"[^>]*value="([^"]*)"', text) for name in ("from", "to")}
         assert any(all(day[name] in shown[name] for name in day) for day in days), shown
+
+
+# --- one meaning of a period at every door
+
+DAYS = ("2026-03-29", "2026-10-25")  # of 23 and of 25 hours
+
+
+def midnight(day: str, days: int = 0, zone: str = "Europe/Berlin") -> datetime:
+    return datetime.combine(date.fromisoformat(day) + timedelta(days), time(), ZoneInfo(zone))
+
+
+@pytest.fixture(scope="module")
+def bordered(server: Server) -> Shop:
+    """Readings exactly at both borders of each day, three of one part at its end, and beside them."""
+    made, instant = Shop(server), timedelta(microseconds=1)
+    moments: list[datetime] = []
+    for day in DAYS:
+        begin, end = midnight(day).astimezone(UTC), midnight(day, 1).astimezone(UTC)
+        hours = [begin + timedelta(hours=hour) for hour in range(int((end - begin) / timedelta(hours=1)))]
+        moments += [begin - instant, *hours, end - instant, end, end, end]
+    made.push([at % 7 / 10 for at in range(len(moments))], measured_at=[at.isoformat() for at in moments])
+    made.call(
+        "POST",
+        path_of(made, "/baselines"),
+        201,
+        quantity="deviation",
+        first_sequence=1,
+        last_sequence=30,
+        reason="calm",
+    )
+    for number in range(1, len(moments) + 1):
+        note: dict[str, Any] = {
+            "machine": made.machine,
+            "characteristic": made.characteristic,
+            "sequence": number,
+            "text": str(number),
+        }
+        made.call("POST", "/notes", 201, **note)
+    return made
+
+
+def path_of(made: Shop, more: str) -> str:
+    return f"/characteristics/{made.characteristic}{more}"
+
+
+Found = tuple[int, int, int, float | None]  # count, first, last, mean in µm
+
+
+def by_number(numbers: list[int], mean: float | None = None) -> Found:
+    return len(numbers), min(numbers), max(numbers), mean
+
+
+def doors(made: Shop, start: str, end: str) -> dict[str, Found]:
+    """The answer of each door for one period."""
+    key, query = made.characteristic, urlencode({"from": start, "to": end})
+
+    def get(path: str) -> Any:
+        return made.call("GET", f"{path}{'&' if '?' in path else '?'}{query}")
+
+    found: dict[str, Found] = {}
+    numbers = get(path_of(made, "/statistics"))
+    found["statistics"] = (
+        numbers["count"],
+        numbers["first_sequence"],
+        numbers["last_sequence"],
+        numbers["mean"] * 1000,
+    )
+    study = get(path_of(made, "/capability"))
+    found["capability"] = (study["readings"], study["first_sequence"], study["last_sequence"], study["mean"] * 1000)
+    listed = get(f"/readings?limit=1000&characteristic={key}")["items"]
+    found["list"] = by_number([row["sequence"] for row in listed], fmean(row["deviation"] for row in listed) * 1000)
+    listed = get(f"/readings?limit=1000&machine={made.machine}")["items"]
+    found["list of a machine"] = by_number([row["sequence"] for row in listed])
+    chart = get(path_of(made, "/control"))
+    found["control"] = by_number(chart["points"]["last"], fmean(chart["points"]["value"]) * 1000)
+    assert (chart["first_sequence"], chart["last_sequence"]) == found["control"][1:3]
+    found["notes"] = by_number([row["sequence"] for row in get(f"/notes?limit=1000&characteristic={key}")["items"]])
+    run = next(trace for trace in get(path_of(made, "/figures/run"))["data"] if trace.get("meta") == "run")
+    found["figure"] = len(run["x"]), numbers["first_sequence"], numbers["last_sequence"], (fmean(run["y"]) - 40) * 1000
+    lines = list(csv.DictReader(io.StringIO(made.admin.get(f"/api/v1{path_of(made, '/control.csv')}?{query}").text)))
+    found["control.csv"] = by_number([int(line["last_reading"]) for line in lines])
+    report = get(path_of(made, "/report.json"))
+    facts = {fact["key"]: fact for section in report["sections"][:1] for fact in section["facts"]}
+    first, last = re.findall(r"readings (\d+) to (\d+)", report["period"])[0]
+    found["report"] = facts["count"]["value"], int(first), int(last), facts["mean"]["value"]
+    asked: dict[str, Any] = {"from": start, "to": end, "weighting_factor": 3}
+    what_if = made.call("POST", path_of(made, "/what-if"), **asked)
+    found["what-if"] = what_if["readings"], what_if["first_sequence"], what_if["last_sequence"], None
+    file = made.admin.get(f"/api/v1/readings.dfq?characteristic={key}&{query}").text
+    values = [float(re.split("[\x0f\x14]", line)[0]) for line in file.split("\r\n") if line[:1].isdigit()]
+    found["AQDEF"] = len(values), *found["statistics"][1:3], (fmean(values) - 40) * 1000
+    return found
+
+
+def commands(made: Shop, start: str, end: str) -> dict[str, Found]:
+    about = {"INBAND_DATABASE_URL": made.server.database.dsn, "INBAND_TIMEZONE": "Europe/Berlin"}
+    period = ("--from", start, "--to", end)
+    done = inband("export", "--characteristic", made.characteristic, *period, **about)
+    rows = list(csv.DictReader(io.StringIO(done.stdout)))
+    found = {
+        "export": by_number([int(row["sequence"]) for row in rows], fmean(float(r["deviation"]) for r in rows) * 1000)
+    }
+    first, last = re.findall(r"numbers (\d+) to (\d+)", done.stderr)[0]
+    assert (int(first), int(last)) == found["export"][1:3]
+    done = inband("report", made.characteristic, *period, "--format", "csv", **about)
+    said = {row["key"]: row for row in reversed(list(csv.DictReader(io.StringIO(done.stdout.removeprefix("\ufeff")))))}
+    first, last = re.findall(r"readings (\d+) to (\d+)", said["period"]["text"])[0]
+    return found | {"report": (int(said["count"]["value"]), int(first), int(last), float(said["mean"]["value"]))}
+
+
+@pytest.mark.parametrize("day", DAYS)
+def test_every_door_means_the_same_period(bordered: Shop, viewer: Person, day: str) -> None:
+    """From midnight on, and before the next one: as a day, as moments with an offset; and the next day has the rest."""
+    hours = round((midnight(day, 1).astimezone(UTC) - midnight(day).astimezone(UTC)) / timedelta(hours=1))
+    first = 2 + DAYS.index(day) * (23 + 5)
+    count = hours + 1  # one for each hour, and the last instant; none of the three of midnight
+    mean = fmean((number - 1) % 7 / 10 for number in range(first, first + count))
+    as_moments = midnight(day).isoformat(), midnight(day, 1).isoformat()
+    for start, end in ((day, day), as_moments):
+        for door, found in doors(bordered, start, end).items():
+            assert found[:3] == (count, first, first + count - 1), (door, start)
+            assert found[3] is None or found[3] == pytest.approx(mean, abs=1e-3), (door, start)
+    for start, end in ((day, day), (f"{day} 00:00", as_moments[1])):
+        page = viewer.open(path_of(bordered, f"?{urlencode({'from': start, 'to': end})}"))
+        assert re.search(rf"<span[^>]*>{count}</span>", page), start
+    after = bordered.call("GET", path_of(bordered, f"/statistics?{urlencode({'from': as_moments[1], 'last': 60})}"))
+    assert after["first_sequence"] == first + count
+
+
+def test_commands_mean_it_too(bordered: Shop) -> None:
+    asked = DAYS[1], DAYS[1]
+    there = doors(bordered, *asked)["statistics"]
+    for door, found in commands(bordered, *asked).items():
+        assert found[:3] == there[:3], door
+        assert found[3] == pytest.approx(there[3], abs=1e-6), door
+
+
+def test_a_period_that_ends_where_it_begins_is_empty_and_a_wrong_one_is_refused(bordered: Shop) -> None:
+    def asked(start: str, end: str, status: int = 200) -> Any:
+        return bordered.call("GET", path_of(bordered, f"/statistics?{urlencode({'from': start, 'to': end})}"), status)
+
+    at = midnight(DAYS[0]).isoformat()
+    assert asked(at, at)["count"] == 0
+    for start, end in ((DAYS[1], DAYS[0]), ("2026-03-05T06:00:00", "2026-03-06"), ("2026-02-30", "2026-03-06")):
+        assert {each["field"] for each in asked(start, end, 422)["errors"]} == {"from"}
+    assert {each["field"] for each in asked(DAYS[0], "9999-12-31", 422)["errors"]} == {"to"}
+
+
+def test_a_day_of_a_report_is_one_of_the_zone_that_it_names(bordered: Shop) -> None:
+    def made(**more: str) -> str:
+        query = urlencode({"from": DAYS[0], "to": DAYS[0], "section": "numbers", **more})
+        period: str = bordered.call("GET", path_of(bordered, f"/report.json?{query}"))["period"]
+        return period.partition(",")[0]
+
+    assert made() == "2026-03-29 00:00:00 – 2026-03-30 00:00:00"
+    assert made(timezone="Asia/Tokyo") == "2026-03-29 00:00:00 – 2026-03-30 00:00:00"
+    body = ReportsIn.model_validate({"from": DAYS[0], "to": DAYS[0], "timezone": "Asia/Tokyo"})
+    assert body.bundle().request.period == (midnight(DAYS[0], zone="Asia/Tokyo"), midnight(DAYS[0], 1, "Asia/Tokyo"))

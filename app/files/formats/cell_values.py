@@ -2,7 +2,7 @@
 
 import re
 import unicodedata
-from datetime import UTC, datetime, timedelta, timezone
+from datetime import UTC, date, datetime, timedelta, timezone
 from functools import lru_cache
 from typing import Literal, cast
 from zoneinfo import ZoneInfo, available_timezones
@@ -99,6 +99,23 @@ def moment(
         )
     # With its offset, not with the zone: moments of one zone are compared by their wall clocks, whatever the offsets are.
     return local.astimezone(timezone(cast("timedelta", local.utcoffset())))
+
+
+def day(text: str) -> date | None:
+    """The day, where nothing but a day is written; None otherwise.
+
+    >>> day("2026-03-05"), day("5. 3. 2026"), day("2026-03-05 00:00")
+    (datetime.date(2026, 3, 5), datetime.date(2026, 3, 5), None)
+    """
+    written = plain(text)
+    try:
+        if re.fullmatch(r"\d{4}-\d{2}-\d{2}", written):
+            return date.fromisoformat(written)
+        if (match := _DAY_FIRST.fullmatch(written)) and match[4] is None:
+            return date(int(match[3]), int(match[2]), int(match[1]))
+    except ValueError:
+        pass
+    return None
 
 
 def _by_pattern(text: str, pattern: str) -> datetime:

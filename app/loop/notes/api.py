@@ -10,9 +10,9 @@ from app.loop.machines.queries import only_machine
 from app.loop.notes import actions, queries
 from app.loop.notes.schemas import NoteIn, WrittenNote
 from app.web.api import Before, Limit, MachineFilter, api_router, problems
-from app.web.choice import check_order
+from app.web.choice import InPeriod
 from app.web.deps import SessionDep
-from app.web.fields import LARGEST_ID, Moment, Page, ReasonIn, Slug, page_of
+from app.web.fields import LARGEST_ID, Page, ReasonIn, Slug, page_of
 
 router = api_router("notes")
 Number = Annotated[int, Path(ge=1, le=LARGEST_ID, description="Number of the note.", examples=[7])]
@@ -35,18 +35,16 @@ def write_note(session: SessionDep, caller: Operator, note: NoteIn, response: Re
 def list_notes(
     session: SessionDep,
     caller: AnyCaller,
+    period: InPeriod,
     machine: MachineFilter = None,
     characteristic: Annotated[
         Slug | None, Query(description="Those on the charts of this characteristic: its own, and those of its machine.")
     ] = None,
-    start: Annotated[Moment | None, Query(alias="from", description="About this moment or later ones.")] = None,
-    end: Annotated[Moment | None, Query(alias="to", description="About this moment or earlier ones.")] = None,
     withdrawn: Annotated[bool, Query(description="Those that were withdrawn as well.")] = False,
     before: Before = None,
     limit: Limit = 100,
 ) -> Page[WrittenNote]:
     """Notes, the last written first. The key of a machine sees those of that machine."""
-    check_order(start, end)
     machine_id = only_machine(session, caller, machine)
     rows = queries.notes(
         session,
@@ -54,8 +52,7 @@ def list_notes(
         characteristic=characteristic_for(session, caller, characteristic, "viewer").characteristic
         if characteristic
         else None,
-        start=start,
-        end=end,
+        period=period,
         withdrawn=withdrawn,
         before=before,
         limit=limit + 1,

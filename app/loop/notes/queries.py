@@ -1,12 +1,13 @@
 """Notes of machines and characteristics. Never writes."""
 
-from datetime import datetime
 from typing import NamedTuple
 
 from sqlalchemy import ColumnElement, Select, or_, select
 from sqlalchemy.orm import Session
 
 from app.access.callers import Caller
+from app.core.period import ALWAYS, Period
+from app.db.period import in_period
 from app.db.text import holds_words
 from app.errors import NotFound
 from app.language.i18n import _
@@ -67,8 +68,7 @@ def notes(
     *,
     machine_id: int | None = None,
     characteristic: Characteristic | None = None,
-    start: datetime | None = None,
-    end: datetime | None = None,
+    period: Period = ALWAYS,
     named: str = "",
     holding: str = "",
     withdrawn: bool = False,
@@ -77,7 +77,7 @@ def notes(
 ) -> list[NoteRow]:
     """Notes, the last written first.
 
-    characteristic: those on its charts, its machine's too. start, end: of the moments that they are about. named: those whose
+    characteristic: those on its charts, its machine's too. period: of the moments that they are about. named: those whose
     text holds this. holding: those in whose text, author or name of what they are about these words stand. withdrawn: these as well.
     """
     query = _ROWS.order_by(Note.id.desc()).limit(limit)
@@ -85,10 +85,8 @@ def notes(
         query = query.where(Note.machine_id == machine_id)
     if characteristic is not None:
         query = query.where(Note.machine_id == characteristic.machine_id, on_charts_of(characteristic.id))
-    if start is not None:
-        query = query.where(Note.at >= start)
-    if end is not None:
-        query = query.where(Note.at <= end)
+    if period.bounded:
+        query = query.where(in_period(Note.at, period))
     if named:
         query = query.where(Note.text.icontains(named, autoescape=True))
     names = (Note.text, Note.written_by, Machine.name, Characteristic.name)

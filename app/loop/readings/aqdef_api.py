@@ -24,9 +24,10 @@ from app.loop.readings.importing.aqdef.actions import Outcome, Result
 from app.loop.readings.importing.aqdef.matching import Content
 from app.loop.readings.importing.aqdef.sorting import Wishes
 from app.web.api import api_router, problems
+from app.web.choice import InPeriod
 from app.web.deps import SessionDep
 from app.web.downloads import download
-from app.web.fields import Body, Moment
+from app.web.fields import Body
 from app.web.limits import MEGABYTE, takes
 
 router = api_router("readings")
@@ -53,10 +54,7 @@ def get_aqdef(
         str,
         Query(max_length=2000, description="Keys of the characteristics, parted by commas.", examples=["shaft-d40"]),
     ],
-    since: Annotated[
-        Moment | None, Query(alias="from", description="Measured at this moment or later.", examples=[None])
-    ] = None,
-    until: Annotated[Moment | None, Query(alias="to", description="Measured before.", examples=[None])] = None,
+    period: InPeriod,
     last: Annotated[
         int, Query(ge=1, le=MOST, description="Of each characteristic only so many, the last ones.")
     ] = 10_000,
@@ -69,7 +67,7 @@ def get_aqdef(
         raise Invalid.at("last", _("at most {most} readings come in one answer; ask for fewer").format(most=MOST))
     with TemporaryDirectory() as folder:
         path = Path(folder) / "readings.dfq"
-        write_aqdef(session, keys, path, since=since, until=until, last=last)
+        write_aqdef(session, keys, path, period=period, last=last)
         content = path.read_bytes()
     name = keys[0] if len(keys) == 1 else "readings"
     return download(content, f"{name}.dfq", AQDEF)

@@ -15,6 +15,7 @@ from sqlalchemy.orm import Session
 
 from app.core.decision.limits import Zone
 from app.core.parameters import Parameters
+from app.core.period import ALWAYS, Period
 from app.errors import Invalid, NotFound
 from app.files.formats.aqdef_writer import Catalogues, Described, Outcome, Part, Validity, Written, write
 from app.language.i18n import _
@@ -52,11 +53,10 @@ def write_aqdef(
     keys: Sequence[str],
     path: Path,
     *,
-    since: datetime | None = None,
-    until: datetime | None = None,
+    period: Period = ALWAYS,
     last: int | None = None,
 ) -> Outcome:
-    """Write the readings of these characteristics. since, until, last: as `exporting.rows` takes them, for each of them.
+    """Write the readings of these characteristics. period, last: as `exporting.rows` takes them, for each of them.
 
     Raises `NotFound` and `Invalid`.
     """
@@ -78,7 +78,7 @@ def write_aqdef(
         process=PROCESS,
     )
     values = merge(
-        *(_values(session, _Of(place, each), since=since, until=until, last=last) for place, each in enumerate(chosen)),
+        *(_values(session, _Of(place, each), period=period, last=last) for place, each in enumerate(chosen)),
         key=lambda value: value.at,
     )
     return write(path, parts, described, values, catalogues)
@@ -110,9 +110,7 @@ def _decimals(parameters: Parameters) -> int:
     return next((places for places in range(3, 6) if parameters.tolerance_width / 50 >= 10.0**-places), 6)
 
 
-def _values(
-    session: Session, of: _Of, *, since: datetime | None, until: datetime | None, last: int | None
-) -> Iterator[Written]:
+def _values(session: Session, of: _Of, *, period: Period, last: int | None) -> Iterator[Written]:
     entry = queries.entry_of(session, of.current.characteristic.key)
     if entry is None:
         raise NotFound(_("There is no characteristic {key}.").format(key=repr(of.current.characteristic.key)))
@@ -121,7 +119,7 @@ def _values(
     changes = _changes(session, machine.id, parameters.tool_memory)
     offsets = _offsets(session, machine.id, parameters.tool_memory)
     before: datetime | None = None
-    for row in exporting.rows(session, entry, since=since, until=until, last=last):
+    for row in exporting.rows(session, entry, period=period, last=last):
         at: datetime = row["measured_at"]
         changed = before is not None and any(before < each <= at for each in changes)
         before = at

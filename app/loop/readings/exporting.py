@@ -10,7 +10,9 @@ from sqlalchemy import select, text
 from sqlalchemy.orm import Session
 
 from app.core.decision.step import DECIMALS
+from app.core.period import ALWAYS, Period
 from app.core.variants import Results
+from app.db.period import in_period
 from app.files.formats.delimited import defused
 from app.language.times import local
 from app.loop.characteristics.queries import parameters_of
@@ -53,11 +55,10 @@ def rows(
     session: Session,
     entry: Entry,
     *,
-    since: datetime | None = None,
-    until: datetime | None = None,
+    period: Period = ALWAYS,
     last: int | None = None,
 ) -> Generator[dict[str, Any], None, None]:
-    """Readings in the order of their arrival: measured from `since` on and before `until`, of the last `last`."""
+    """Readings in the order of their arrival: measured in the period, of the last `last`."""
     hand = by_hand.latest_of_each()
     here = (Reading.machine_id == entry.machine_id, Reading.characteristic_id == entry.characteristic_id)
     query = (
@@ -104,10 +105,8 @@ def rows(
         .where(*here)
         .order_by(Reading.sequence)
     )
-    if since is not None:
-        query = query.where(Reading.measured_at >= since)
-    if until is not None:
-        query = query.where(Reading.measured_at < until)
+    if period.bounded:
+        query = query.where(in_period(Reading.measured_at, period))
     if last is not None:
         newest = select(Reading.sequence).where(*here).order_by(Reading.sequence.desc()).offset(last).limit(1)
         before = session.scalar(newest)
@@ -127,6 +126,22 @@ def rows(
                 targets[version] = parameters_of(session, entry.machine_id, entry.characteristic_id, version).target
             # Target + deviation, mm: the size as the drawing counts it.
             yield row | {"corrected_size": round(targets[version] + row["deviation"], DECIMALS)}
+
+
+class Ends:
+    """The first and last of the readings that pass: their numbers, and from when to when they were measured."""
+
+    def __init__(self) -> None:
+        self.numbers: tuple[int, int] | None = None
+        self.span: tuple[datetime, datetime] | None = None
+
+    def of(self, readings: Iterator[dict[str, Any]]) -> Iterator[dict[str, Any]]:
+        """The same readings; afterwards the ends are known."""
+        for row in readings:
+            number, at = row["sequence"], row["measured_at"]
+            self.numbers = (self.numbers[0] if self.numbers else number, number)
+            self.span = (min(self.span[0], at), max(self.span[1], at)) if self.span else (at, at)
+            yield row
 
 
 def write_csv(readings: Iterator[dict[str, Any]], file: TextIO) -> int:

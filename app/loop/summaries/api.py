@@ -9,9 +9,9 @@ from app.access.deps import AnyCaller
 from app.loop.characteristics import queries as characteristics
 from app.loop.summaries import queries
 from app.web.api import CharacteristicKey, api_router, problems
-from app.web.choice import check_order
+from app.web.choice import InPeriod
 from app.web.deps import FROM_REPLICA, SessionDep
-from app.web.fields import LARGEST_ID, Moment, answer_from
+from app.web.fields import LARGEST_ID, answer_from
 
 router = api_router("statistics", FROM_REPLICA)
 
@@ -50,21 +50,15 @@ def get_statistics(
     session: SessionDep,
     caller: AnyCaller,
     characteristic: CharacteristicKey,
-    start: Annotated[
-        Moment | None, Query(alias="from", description="Measured at this moment or later.", examples=[None])
-    ] = None,
-    end: Annotated[
-        Moment | None, Query(alias="to", description="Measured at this moment or earlier.", examples=[None])
-    ] = None,
+    period: InPeriod,
     last: Annotated[int | None, Query(ge=1, le=LARGEST_ID, description="Only of the last so many readings.")] = None,
 ) -> StatisticsOut:
-    """Number, mean, standard deviation, extremes, zones: exact, of all readings or of those measured from … to.
+    """Number, mean, standard deviation, extremes, zones: exact, of all readings or of those measured in a period.
 
-    With `last` as well, of the last so many readings those that were measured from … to count.
+    With `last` as well, of the last so many readings those that were measured in it count.
     """
-    check_order(start, end)
     current = characteristics.characteristic_for(session, caller, characteristic, "viewer")
-    window = queries.window_of(session, current.characteristic, last=last, start=start, end=end)
+    window = queries.window_of(session, current.characteristic, last=last, period=period)
     numbers = queries.numbers_of(session, current.characteristic, window)
     rejects = of_tool = None
     if current.parameters.accept_m > 1:

@@ -9,9 +9,11 @@ from math import ceil, floor
 from typing import NamedTuple
 
 from sqlalchemy import ColumnElement, and_, or_, select, true
-from sqlalchemy.orm import InstrumentedAttribute, Session
+from sqlalchemy.orm import Session
 
 from app.charts import Chart
+from app.core.period import Period
+from app.db.period import in_period
 from app.language.i18n import _
 from app.loop.alarms.kinds import kind_named
 from app.loop.characteristics.queries import CurrentCharacteristic
@@ -28,19 +30,6 @@ from app.loop.timeline.figures import CALIBRATION, MANUAL_EDIT, NOTE, PARAMETERS
 
 MOST = 1_000  # events of each kind, the newest
 MOST_MOMENTS = 600  # readings whose moments say between which of them an event lies: more than marks have room
-
-
-class Period(NamedTuple):
-    """From … to; an open end is None."""
-
-    start: datetime | None
-    end: datetime | None
-
-    def holds(self, column: InstrumentedAttribute[datetime]) -> ColumnElement[bool]:
-        """Lies in it, as a condition on a column of moments."""
-        return and_(
-            true() if self.start is None else column >= self.start, true() if self.end is None else column <= self.end
-        )
 
 
 def with_events(
@@ -83,7 +72,9 @@ def with_events_of_machine(
         *_alarms(session, machine, _of_place(place) if tool is None else Alarm.tool_memory == tool, period),
         *(_calibrations(session, machine, true(), period) if tool is None else ()),
         *_tool_events(session, machine, true() if tool is None else ToolEvent.number == tool, period),
-        *_notes(session, machine, true() if tool is None else Note.characteristic_id.is_(None), period.holds(Note.at)),
+        *_notes(
+            session, machine, true() if tool is None else Note.characteristic_id.is_(None), in_period(Note.at, period)
+        ),
     ]
     events = [each.event for each in happened if each.event.kind not in without]
     return with_lane(chart, events, width, lines=False)
@@ -98,7 +89,7 @@ def _of_place(place: tuple[str, int] | None) -> ColumnElement[bool]:
 
 
 def _period(span: tuple[float, float]) -> Period:
-    return Period(*(datetime.fromtimestamp(end, UTC) for end in span))
+    return Period.through(*(datetime.fromtimestamp(end, UTC) for end in span))
 
 
 def events_in(session: Session, current: CurrentCharacteristic, period: Period) -> list[Event]:
@@ -161,7 +152,7 @@ def _of_characteristic(
     session: Session, current: CurrentCharacteristic, period: Period, numbers: tuple[int, int] | None = None
 ) -> list[_Happened]:
     """Everything of the period. numbers: of the first and last reading; notes about one of them are found by its number."""
-    noted = period.holds(Note.at)
+    noted = in_period(Note.at, period)
     if numbers is not None:
         noted = or_(Note.sequence.is_(None) & noted, Note.sequence.between(*numbers))
     machine, parameters = current.machine, current.parameters
@@ -191,7 +182,7 @@ def _alarms(
     """Alarms. characteristic: those of it lead to the reading that raised them."""
     rows = session.execute(
         select(Alarm.id, Alarm.kind, Alarm.raised_at, Alarm.acknowledged_at, Alarm.characteristic_id, Alarm.sequence)
-        .where(Alarm.machine_id == machine.id, concerned, period.holds(Alarm.raised_at))
+        .where(Alarm.machine_id == machine.id, concerned, in_period(Alarm.raised_at, period))
         .order_by(Alarm.id.desc())
         .limit(MOST)
     )
@@ -208,7 +199,7 @@ def _calibrations(
     record = CalibrationRecord
     rows = session.execute(
         select(record.number, record.memory, record.location, record.calibrated_at, record.received_at)
-        .where(record.machine_id == machine.id, concerned, period.holds(record.received_at))
+        .where(record.machine_id == machine.id, concerned, in_period(record.received_at, period))
         .order_by(record.number.desc())
         .limit(MOST)
     )
@@ -225,7 +216,10 @@ def _tool_events(
     rows = session.execute(
         select(ToolEvent.number, ToolEvent.kind, ToolEvent.at)
         .where(
-            ToolEvent.machine_id == machine.id, ToolEvent.kind != "correction", concerned, period.holds(ToolEvent.at)
+            ToolEvent.machine_id == machine.id,
+            ToolEvent.kind != "correction",
+            concerned,
+            in_period(ToolEvent.at, period),
         )
         .order_by(ToolEvent.id.desc())
         .limit(MOST)
@@ -245,7 +239,7 @@ def _versions(session: Session, current: CurrentCharacteristic, period: Period) 
             version.machine_id == current.machine.id,
             version.characteristic_id == current.characteristic.id,
             version.version > 1,
-            period.holds(version.created_at),
+            in_period(version.created_at, period),
         )
         .order_by(version.version.desc())
         .limit(MOST)

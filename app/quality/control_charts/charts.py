@@ -113,7 +113,7 @@ def _settling(points: Charted, window: Window) -> int:
     if points.baseline.quantity != Quantity.WEAR_RESIDUALS:
         return 0
     read, judged = (
-        int(((series.sequence >= window.first) & window.holds(at)).sum())
+        int(((series.sequence >= window.first) & window.period.among(at)).sum())
         for series, at in ((points.read.series, points.read.measured_at), (points.series, points.series_at))
     )
     return read - judged

@@ -1,7 +1,6 @@
 """Pages: the control charts of a characteristic with its baselines, and the editor that freezes one."""
 
 from collections.abc import Mapping
-from datetime import datetime
 from functools import cached_property
 from typing import Annotated, Any, Literal
 from urllib.parse import urlencode
@@ -129,16 +128,6 @@ class ControlPage:
         ]
 
 
-def _as_query(choice: Choice) -> dict[str, Any]:
-    names = {"start": "from", "end": "to"}
-    chosen = {
-        names.get(name, name): value.isoformat() if isinstance(value, datetime) else value
-        for name, value in choice._asdict().items()
-        if value is not None
-    }
-    return chosen or {"last": "all"}
-
-
 @router.get("/characteristics/{characteristic}/control")
 def control_page(
     request: Request,
@@ -174,7 +163,7 @@ def _control(
         else queries.baseline_of(session, current.characteristic, version)
     )
     kind = Chart(chart) if chart and judge is not None and Chart(chart) in charts.kinds(judge) else None
-    chosen, kept = _as_query(choice), {"chart": kind and kind.value, "baseline": version}
+    chosen, kept = choice.query, {"chart": kind and kind.value, "baseline": version}
 
     def link(**changes: Any) -> str:
         """This page with something else chosen."""
@@ -285,13 +274,13 @@ def _pictured(typed: Mapping[str, str], choice: Choice) -> dict[str, Any]:
         period = parsed(PeriodIn, form_reader.period(typed))
     except Invalid:
         known = typed.get("quantity") in set(Quantity)
-        return _as_query(choice) | ({"quantity": typed["quantity"]} if known else {})
+        return choice.query | ({"quantity": typed["quantity"]} if known else {})
     names = ("chart", "grouping", "group_size", "group_pause", "settle", "first_sequence", "last_sequence")
     values = {name: getattr(period, name) for name in names} | {
         "quantity": period.quantity.value,
         "excluded": ",".join(f"{run.first}-{run.last}" for run in period.excluded),
     }
-    return _as_query(choice) | {name: value for name, value in values.items() if value not in (None, "")}
+    return choice.query | {name: value for name, value in values.items() if value not in (None, "")}
 
 
 @router.post("/characteristics/{characteristic}/control/freeze")
@@ -330,5 +319,5 @@ def change(
     except InbandError as error:
         if error.status not in (409, 422):
             raise
-        return _control(request, session, caller, current, Choice(200, None, None, None, None), error=error)
+        return _control(request, session, caller, current, Choice(200), error=error)
     return RedirectResponse(f"/characteristics/{current.characteristic.key}/control", 303)

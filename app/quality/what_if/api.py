@@ -22,8 +22,9 @@ from app.quality.what_if.schemas import (
     WhatIfOut,
 )
 from app.web.api import FIGURE, Before, CharacteristicKey, Limit, Theme, Width, api_router, chart_answer, problems
+from app.web.choice import InPeriod
 from app.web.deps import SessionDep
-from app.web.fields import LARGEST_ID, Moment, Page, page_of
+from app.web.fields import LARGEST_ID, Page, page_of
 
 router = api_router("what-if")
 
@@ -60,6 +61,7 @@ def map_settings(session: SessionDep, characteristic: CharacteristicKey, asked: 
 
 
 def asked_for(
+    period: InPeriod,
     weighting_factor: Annotated[float | None, Query(ge=1, le=1_000_000, description="k (R29); else today's.")] = None,
     zero_range: Annotated[float | None, Query(ge=0, le=LARGEST_LENGTH, description="R33, mm; else today's.")] = None,
     averaging_limit: Annotated[
@@ -70,8 +72,6 @@ def asked_for(
     effect: Annotated[float, Query(ge=0.05, le=5, description="The share of a correction that acts.")] = 1.0,
     measured: Annotated[bool, Query(description="As measured on these readings, whatever `effect` says.")] = False,
     last: Annotated[int | None, Query(ge=1, le=LARGEST_ID, description="The last so many readings.")] = None,
-    start: Annotated[Moment | None, Query(alias="from", description="Measured at this moment or later.")] = None,
-    end: Annotated[Moment | None, Query(alias="to", description="Measured at this moment or earlier.")] = None,
 ) -> WhatIfIn:
     """The question as an address says it."""
     return WhatIfIn.model_validate(
@@ -83,8 +83,8 @@ def asked_for(
             "delay": delay,
             "effect": None if measured else effect,
             "last": last,
-            "from": start,
-            "to": end,
+            "from": period.start,
+            "to": period.end,
         }
     )
 

@@ -1,16 +1,19 @@
 """The what-if as its page asks it: an address that says everything, lengths in µm, today's value where a field is empty."""
 
 from collections.abc import Mapping
-from typing import Any, Literal
+from datetime import datetime
+from typing import Any
 from urllib.parse import urlencode
 
 from app.core.parameters import Parameters
-from app.files.formats import cell_values
+from app.core.period import Period
+from app.files.formats import cell_values, periods
 from app.language.i18n import _
 from app.language.numbers import short
 from app.language.times import plant_zone
 from app.quality.what_if.queries import USUAL
 from app.quality.what_if.schemas import MapIn, WhatIfIn
+from app.web.choice import in_address
 from app.web.forms import length, parsed
 
 FIELDS = ("k", "r33", "r34", "factor", "delay", "effect", "last", "from", "to", "goal")
@@ -58,8 +61,8 @@ def _common(typed: Mapping[str, str]) -> dict[str, Any]:
         else int(last)
         if last.isascii() and last.isdigit() and len(last) < 16
         else last,
-        "from": moment(typed["from"], 0),
-        "to": moment(typed["to"], 1),
+        "from": moment(typed["from"], end=False),
+        "to": moment(typed["to"], end=True),
     }
 
 
@@ -82,12 +85,13 @@ def mm(text: str) -> float | str | None:
     return round(value / 1000, 9) if isinstance(value, float) and abs(value) < 1e12 else value
 
 
-def moment(text: str, fold: Literal[0, 1]) -> str | None:
+def moment(text: str, *, end: bool) -> str | None:
     """A day or a moment as people type it, of the plant's clock; what is none is left for the schema to refuse."""
     try:
-        return cell_values.moment(text, plant_zone(), fold=fold).isoformat() if text else None
+        at = periods.bound(text, plant_zone(), end=end)
     except cell_values.Unreadable:
         return text
+    return at.isoformat() if at else None
 
 
 def address(key: str, typed: Mapping[str, str], **changes: str) -> str:
@@ -104,10 +108,9 @@ def again(key: str, changes: Mapping[str, float], evidence: Mapping[str, Any]) -
         "r33": f"{changes['zero_range'] * 1000:.9g}" if "zero_range" in changes else "",
         "r34": f"{changes['averaging_limit'] * 1000:.9g}" if "averaging_limit" in changes else "",
         "factor": f"{changes['factor']:.9g}" if "factor" in changes else "",
-        "from": evidence["start"][:26].rstrip("Z") + "+00:00",
-        "to": evidence["end"][:26].rstrip("Z") + "+00:00",
     }
-    return address(key, typed)
+    replayed = Period.through(*(datetime.fromisoformat(evidence[name]) for name in ("start", "end")))
+    return address(key, typed | {name: text for name, text in in_address(replayed).items() if text})
 
 
 def effects(chosen: str) -> list[tuple[str, str]]:
@@ -145,7 +148,7 @@ def at_fields(errors: Mapping[str, str]) -> dict[str, str]:
     return {names.get(field, field): message for field, message in errors.items()}
 
 
-def periods(chosen: str) -> list[tuple[str, str]]:
+def counts(chosen: str) -> list[tuple[str, str]]:
     """Choices for the number of readings."""
     offered = [
         (count, _("All readings") if count == "all" else _("The last {count}").format(count=count)) for count in PERIODS

@@ -84,7 +84,7 @@ def _what_if(
         today=current.parameters,
         typed=typed,
         tool_since=summaries.tool_since(session, current.characteristic),
-        periods=form_reader.periods(typed["last"]),
+        periods=form_reader.counts(typed["last"]),
         placeholders=form_reader.placeholders(current.parameters, answer.past.delay if answer else None),
         errors=errors,
         problem=problem,

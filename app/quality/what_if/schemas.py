@@ -5,12 +5,15 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, Field
 
+from app.core.period import Period
 from app.core.policy_map import Criterion
 from app.core.replay import LONGEST_DELAY
+from app.files.formats import periods
 from app.quality.what_if.evidence import cell_of, evidence_of, period_of
 from app.quality.what_if.proposals import ProposalRow
 from app.quality.what_if.queries import USUAL, Map, Simulation
-from app.web.fields import LARGEST_ID, Body, Moment, Reason, answer_from
+from app.web.choice import BEGINNING, ENDING, Beginning, Ending
+from app.web.fields import LARGEST_ID, Body, Reason, answer_from
 
 LARGEST_LENGTH = 100_000.0
 Length = Annotated[float, Field(ge=0, le=LARGEST_LENGTH, strict=True)]
@@ -22,8 +25,13 @@ class ReplayPeriodIn(Body):
     last: Annotated[int | None, Field(ge=1, le=LARGEST_ID, strict=True, description="The last so many readings.")] = (
         None
     )
-    start: Annotated[Moment | None, Field(alias="from", description="Measured at this moment or later.")] = None
-    end: Annotated[Moment | None, Field(alias="to", description="Measured at this moment or earlier.")] = None
+    start: Annotated[Beginning | None, Field(alias="from", description=BEGINNING)] = None
+    end: Annotated[Ending | None, Field(alias="to", description=ENDING)] = None
+
+    @property
+    def period(self) -> Period:
+        """The period to replay. Raises `Invalid` for one that runs backwards."""
+        return periods.in_order(Period(self.start, self.end))
 
     @property
     def newest(self) -> int | None:

@@ -88,9 +88,5 @@ def settings(past: ToolHistory, given: SettingsIn) -> Settings:
 
 
 def _past(session: Session, current: CurrentCharacteristic, given: ReplayPeriodIn) -> ToolHistory:
-    if given.start is not None and given.end is not None and given.start > given.end:
-        raise Invalid.at("from", _("is later than `to`; exchange the two moments"))
-    window = statistics.window_of(
-        session, current.characteristic, last=given.newest, start=given.start, end=given.end, usable=True
-    )
+    window = statistics.window_of(session, current.characteristic, last=given.newest, period=given.period, usable=True)
     return queries.load(session, current, window)

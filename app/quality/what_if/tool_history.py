@@ -19,6 +19,7 @@ from app.core.decision.limits import FAULT, in_nanometres, nanometres, reaches
 from app.core.decision.loops import Mark, ProcessTrace
 from app.core.decision.step import FIRST_MOVE_TRIGGERED, IMPLAUSIBLE, REJECTED, TOOL_WORN_HELD, TOUCH_FAULT, rounded
 from app.core.parameters import Parameters
+from app.core.period import Period
 from app.core.replay import LONGEST_DELAY, Figures, Policy, ReplayedCharacteristic, parts_of, rebuilt
 from app.core.spc.resolution import resolution_of
 from app.errors import Invalid
@@ -188,7 +189,7 @@ def past_of(session: Session, current: CurrentCharacteristic, window: Window) ->
     if len(own):
         began, ended = (_moment(moment) for moment in (own["measured_at"].min(), own["measured_at"].max()))
         for other in others:
-            span = statistics.window_of(session, other.characteristic, start=began, end=ended)
+            span = statistics.window_of(session, other.characteristic, period=Period.through(began, ended))
             if span.count > LARGEST:
                 continue
             history = statistics.history_of(session, other.characteristic, span, columns)

@@ -1,15 +1,15 @@
 """Page: the capability of a characteristic."""
 
-from datetime import datetime
 from typing import Annotated, Any
 from urllib.parse import urlencode
 
 from fastapi import APIRouter, Query, Request, Response
 
 from app.access.deps import AnyCaller, require
+from app.core.period import ALWAYS
 from app.core.spc.refusal import Refused
 from app.errors import Invalid
-from app.files.formats import cell_values
+from app.files.formats import cell_values, periods
 from app.language.i18n import _
 from app.language.times import plant_zone
 from app.loop.characteristics import queries as characteristics
@@ -18,11 +18,12 @@ from app.loop.summaries import wording as statistics
 from app.quality.capability import wording
 from app.quality.capability.pictures import interval
 from app.quality.capability.queries import CONFIDENCE, USUAL, Side
-from app.quality.capability.request import Confidence, Last, OneSide, StudyRequest, in_order, study_of
+from app.quality.capability.request import Confidence, Last, OneSide, StudyRequest, study_of
 from app.quality.gauge_studies import queries as gauges
 from app.quality.gauge_studies import wording as gauge_wording
 from app.quality.proof import queries as proof
 from app.quality.proof import wording as proof_wording
+from app.web.choice import in_address
 from app.web.deps import FROM_REPLICA, SessionDep
 from app.web.forms import by_field
 from app.web.templates import page
@@ -36,24 +37,16 @@ def _typed(
 ) -> tuple[StudyRequest, dict[str, str]]:
     """Read the typed window, with errors by field; if there are any, the last readings. Moments are of the plant's time zone, unless another is named."""
     errors: dict[str, str] = {}
-    zone, moments = None, dict[str, datetime | None]()
+    zone, period = None, ALWAYS
     try:
         zone = cell_values.zone_named(given["timezone"].strip() or plant_zone().key)
     except (cell_values.Unreadable, ValueError) as error:
         errors["timezone"] = str(error)
-    for name in ("from", "to"):
-        text = given[name].strip()
-        try:
-            moments[name] = cell_values.moment(text, zone, fold=1 if name == "to" else 0) if text else None
-        except cell_values.Unreadable as error:
-            errors[name] = str(error)
-    choice = StudyRequest(last, None, None, side, confidence)
-    if not errors:
-        try:
-            return in_order(choice._replace(start=moments["from"], end=moments["to"])), {}
-        except Invalid as error:
-            errors |= by_field(error)
-    return choice, errors
+    try:
+        period = periods.period_of(given, zone)
+    except Invalid as error:
+        errors |= by_field(error)
+    return StudyRequest(last, ALWAYS if errors else period, side, confidence), errors
 
 
 Typed = Annotated[str, Query(max_length=64)]
@@ -89,7 +82,7 @@ def capability_page(
         address = f"/api/v1/characteristics/{current.characteristic.key}/figures/capability"
         return f"{address}?{urlencode(now | {'picture': picture})}"
 
-    timed = choice.start is not None or choice.end is not None
+    timed = choice.period.bounded
     failing = proof.failing()
     return page(
         request,
@@ -137,8 +130,7 @@ def _query(choice: StudyRequest) -> dict[str, str]:
     """The choice as the address says it."""
     named = {
         "last": choice.last,
-        "from": choice.start.isoformat() if choice.start else None,
-        "to": choice.end.isoformat() if choice.end else None,
+        **in_address(choice.period),
         "side": None if choice.side == "both" else choice.side,
         "confidence": None if choice.confidence == 0.95 else f"{choice.confidence:g}",
     }

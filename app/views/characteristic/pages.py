@@ -144,7 +144,7 @@ def characteristic_page(
     """The zone chart, the numbers, the decisions and the parameters of one characteristic."""
     current = queries.characteristic_named(session, characteristic)
     path = f"/characteristics/{current.characteristic.key}"
-    chosen = _as_query(choice)
+    chosen = choice.query
 
     def link(**changes: Any) -> str:
         """This page with something else chosen."""
@@ -196,20 +196,6 @@ def characteristic_page(
         next_action=next_action,
         action_word=action_word,
     )
-
-
-def _as_query(choice: Choice) -> dict[str, Any]:
-    """The choice as the address says it."""
-    if choice == Choice(None, None, None, None, None):
-        return {"last": "all"}
-    named = {
-        "last": choice.last,
-        "first": choice.first,
-        "through": choice.through,
-        "from": choice.start and choice.start.isoformat(),
-        "to": choice.end and choice.end.isoformat(),
-    }
-    return {name: value for name, value in named.items() if value is not None}
 
 
 def parameter_table(stored: Mapping[str, Any]) -> Sequence[tuple[str, str, str]]:

@@ -9,11 +9,11 @@ from sqlalchemy.orm import Session
 
 from app.charts import Chart
 from app.core.decision.limits import Zone
+from app.core.period import Period
 from app.loop.summaries import queries as statistics
 from app.loop.summaries.queries import Numbers
 from app.loop.timeline import queries as timeline
 from app.loop.timeline.figures import Event, span_of
-from app.loop.timeline.queries import Period
 from app.quality.capability.queries import Judgement, judgement_of
 from app.views.characteristic.chart import reading_link
 from app.views.compare.figures import Course
@@ -71,7 +71,7 @@ def events_of(session: Session, compared: Compared, chart: Chart, *, in_time: bo
         return []
     if in_time:
         start, end = (datetime.fromtimestamp(end, UTC) for end in span)
-        events = timeline.events_in(session, current, Period(start, end))
+        events = timeline.events_in(session, current, Period.through(start, end))
     else:
         events = [
             replace(event, at=event.at - window.first + 1)

@@ -41,14 +41,7 @@ def compare_page(
         problem = error
     how = {"by": by.value, "overlaid": overlaid, "of_tolerance": of_tolerance, "own_scale": own_scale}
     said = {name: "true" if value is True else value for name, value in how.items() if value}
-    spans = {
-        "last": None if choice.last is None else str(choice.last),
-        "first": choice.first,
-        "through": choice.through,
-        "from": choice.start.isoformat() if choice.start else None,
-        "to": choice.end.isoformat() if choice.end else None,
-    }
-    period = {name: value for name, value in spans.items() if value is not None} or {"last": "all"}
+    period = choice.query
 
     def link(**changes: object) -> str:
         """This page with something else chosen; None takes a choice away."""

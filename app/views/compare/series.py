@@ -1,12 +1,13 @@
 """The series that are compared: a characteristic and a run of its readings each. Never writes."""
 
-from datetime import UTC, datetime, timedelta
+from datetime import UTC, datetime
 from enum import StrEnum
 from typing import NamedTuple
 
 from sqlalchemy import select
 from sqlalchemy.orm import Session
 
+from app.core.period import Period
 from app.errors import Invalid
 from app.language.i18n import _
 from app.language.times import MINUTES, local, written
@@ -22,7 +23,6 @@ from app.web.fields import HISTORY_BEGINS
 
 MOST = 12  # series on a page
 MOST_EACH = 4  # versions or tools of one characteristic
-INSTANT = timedelta(microseconds=1)  # a reading at the beginning of a period does not belong to the one before
 
 
 class SeriesBy(StrEnum):
@@ -104,7 +104,7 @@ def _by_tool(session: Session, current: CurrentCharacteristic, _choice: Choice) 
         Compared(
             f"{current.characteristic.name}, {_life(life)}",
             current,
-            statistics.window_of(session, current.characteristic, start=life.began_at, end=life.ended_at),
+            statistics.window_of(session, current.characteristic, period=Period(life.began_at, life.ended_at)),
         )
         for life in lives(session, current.machine, number).lives[:MOST_EACH][::-1]
     ]
@@ -127,10 +127,10 @@ def begin_before(start: datetime, end: datetime) -> datetime:
 def _by_period(session: Session, current: CurrentCharacteristic, choice: Choice) -> list[Compared]:
     """The period and the one before it: as long by the clock, or as many readings."""
     now = statistics.window_of(session, current.characteristic, **choice._asdict())
-    if choice.start is not None:
-        start, end = choice.start, choice.end or datetime.now(UTC)
-        begin, until = begin_before(start, end), max(start, HISTORY_BEGINS) - INSTANT
-        before = statistics.window_of(session, current.characteristic, start=begin, end=until)
+    start = choice.period.start
+    if start is not None:
+        begin = begin_before(start, choice.period.end or datetime.now(UTC))
+        before = statistics.window_of(session, current.characteristic, period=Period(begin, start))
     else:
         through = now.first - 1
         before = Window(max(1, through - now.count + 1), through, now.newest)

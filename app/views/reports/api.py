@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from datetime import UTC, datetime
 from typing import Annotated, Any
 
-from fastapi import Depends, Path, Query, Response
+from fastapi import Depends, Path, Query, Request, Response
 
 from app.access.audit.actions import record
 from app.access.callers import Caller
@@ -12,14 +12,15 @@ from app.access.deps import AnyCaller
 from app.files.documents.content import Format, Paper, Report
 from app.files.documents.files import MEDIA_TYPES, file_name, file_of
 from app.files.documents.schemas import ReportOut
+from app.files.formats import periods
 from app.language.times import plant_zone
 from app.loop.characteristics import queries as characteristics
 from app.views.reports import queries
-from app.views.reports.request import EVERYTHING, ReportRequest, SectionName, section_names
+from app.views.reports.request import EVERYTHING, ReportRequest, SectionName, section_names, zone_or_plants
 from app.web.api import CharacteristicKey, api_router, problems
+from app.web.choice import InPeriod
 from app.web.deps import FROM_REPLICA, SessionDep
 from app.web.downloads import download
-from app.web.fields import Moment
 
 router = api_router("reports", FROM_REPLICA)
 
@@ -35,12 +36,8 @@ FILE: dict[int | str, dict[str, Any]] = {
 
 
 def request_from_query(
-    start: Annotated[
-        Moment | None, Query(alias="from", description="Measured at this moment or later.", examples=[None])
-    ] = None,
-    end: Annotated[
-        Moment | None, Query(alias="to", description="Measured at this moment or earlier.", examples=[None])
-    ] = None,
+    request: Request,
+    period: InPeriod,
     last: Annotated[
         str | None,
         Query(
@@ -61,9 +58,12 @@ def request_from_query(
         ),
     ] = None,
 ) -> ReportRequest:
-    """Request for a report, from the query."""
+    """Request for a report, from the query; a day is one of the time zone that is named, as in a command."""
+    zone = zone_or_plants(timezone)
+    if timezone and zone.key == timezone:
+        period = periods.period_of(request.query_params, zone)
     many = EVERYTHING if last == "all" else int(last) if last else None
-    return ReportRequest(start, end, many, section_names(section), paper, timezone or plant_zone().key)
+    return ReportRequest(period, many, section_names(section), paper, timezone or plant_zone().key)
 
 
 ReportQuery = Annotated[ReportRequest, Depends(request_from_query)]

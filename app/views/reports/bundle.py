@@ -10,10 +10,12 @@ from typing import Any, Literal, NamedTuple
 
 import msgspec
 
+from app.core.period import Period
 from app.files.documents.content import Format, Paper, Report
 from app.files.documents.files import MEDIA_TYPES, file_of, workbook
 from app.files.formats.delimited import defused
 from app.views.reports.request import ReportRequest, SectionName
+from app.web.choice import in_address
 
 BundleFormat = Literal["pdf", "xlsx", "csv", "workbook"]
 """A ZIP of files, or one XLSX with a sheet for each."""
@@ -36,8 +38,7 @@ class Bundle:
         request = self.request
         return {
             "characteristics": list(keys),
-            "from": request.start.isoformat() if request.start else None,
-            "to": request.end.isoformat() if request.end else None,
+            **in_address(request.period),
             "last": request.last,
             "sections": [name.value for name in request.sections],
             "paper": request.paper.value,
@@ -51,8 +52,7 @@ class Bundle:
         """The request as it was kept."""
         start, end = (datetime.fromisoformat(stored[name]) if stored[name] else None for name in ("from", "to"))
         request = ReportRequest(
-            start,
-            end,
+            Period(start, end),
             stored["last"],
             tuple(SectionName(name) for name in stored["sections"]),
             Paper(stored["paper"]),

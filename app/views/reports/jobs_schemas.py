@@ -1,18 +1,21 @@
 """Many reports at once as JSON."""
 
 from datetime import datetime
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
-from pydantic import Field
+from pydantic import Field, model_validator
 
+from app.core.period import Period
 from app.files.documents.content import Paper
+from app.files.formats import cell_values, periods
 from app.language.i18n import current_language
 from app.language.times import plant_zone
 from app.views.reports.actions import KEPT_DAYS, MOST_AT_ONCE
 from app.views.reports.bundle import Bundle, BundleFormat
-from app.views.reports.request import ReportRequest, SectionName, section_names
+from app.views.reports.request import ReportRequest, SectionName, section_names, zone_or_plants
 from app.views.reports.tables import ReportJob
-from app.web.fields import LARGEST_ID, Body, Moment, Slug
+from app.web.choice import BEGINNING, ENDING, Beginning, Ending
+from app.web.fields import LARGEST_ID, Body, Slug
 
 Keys = Annotated[list[Slug], Field(max_length=MOST_AT_ONCE)]
 
@@ -25,8 +28,8 @@ class ReportsIn(Body):
 
     characteristics: Keys = Field(default=[], description="Keys of characteristics.")
     machines: Keys = Field(default=[], description="Keys of machines: all of their characteristics.")
-    start: Moment | None = Field(default=None, alias="from", description="Measured at this moment or later.")
-    end: Moment | None = Field(default=None, alias="to", description="Measured at this moment or earlier.")
+    start: Beginning | None = Field(default=None, alias="from", description=BEGINNING)
+    end: Ending | None = Field(default=None, alias="to", description=ENDING)
     last: int | None = Field(
         default=None,
         strict=True,
@@ -43,10 +46,26 @@ class ReportsIn(Body):
         default=None, max_length=64, description="In which moments are written; the plant's if left out."
     )
 
+    @model_validator(mode="before")
+    @classmethod
+    def _days_of_its_zone(cls, body: Any) -> Any:
+        """A day is one of the time zone that is named."""
+        if not isinstance(body, dict) or not isinstance(body.get("timezone"), str):
+            return body
+        zone, days = zone_or_plants(body["timezone"]), {}
+        for name in periods.NAMES:
+            if isinstance(text := body.get(name), str) and (day := cell_values.day(text)) is not None:
+                days[name] = periods.begin_of(day, zone, 1 if name == "to" else 0)
+        return body | days
+
     def bundle(self) -> Bundle:
         """Return the reports to make. Raises `Invalid`."""
         request = ReportRequest(
-            self.start, self.end, self.last, section_names(self.sections), self.paper, self.timezone or plant_zone().key
+            Period(self.start, self.end),
+            self.last,
+            section_names(self.sections),
+            self.paper,
+            self.timezone or plant_zone().key,
         )
         return Bundle(request, self.format, self.characteristics, self.machines, current_language())
 

@@ -19,6 +19,7 @@ from app.quality.proof import queries as proof
 from app.quality.proof import wording as proof_wording
 from app.views.reports import queries
 from app.views.reports.request import EVERYTHING, LAST, ReportRequest, SectionName, typed
+from app.web.choice import in_address
 from app.web.deps import FROM_REPLICA, SessionDep
 from app.web.forms import by_field
 from app.web.period import with_preset
@@ -91,7 +92,7 @@ def _errors(problem: InbandError | None) -> Mapping[str, str]:
 def _runs(key: str, typed_fields: Mapping[str, str], report_request: ReportRequest) -> list[tuple[str, str, bool]]:
     """Links to usual periods."""
     unchanged = {name: typed_fields[name] for name in ("timezone", "paper") if typed_fields[name]}
-    timed = report_request.start is not None or report_request.end is not None
+    timed = report_request.period.bounded
     now = "all" if report_request.last == EVERYTHING else str(report_request.last or LAST)
     return [
         (
@@ -106,8 +107,7 @@ def _runs(key: str, typed_fields: Mapping[str, str], report_request: ReportReque
 def _query(report_request: ReportRequest) -> str:
     """The same request as the API takes them."""
     named: dict[str, Any] = {
-        "from": report_request.start.isoformat() if report_request.start else None,
-        "to": report_request.end.isoformat() if report_request.end else None,
+        **in_address(report_request.period),
         "last": "all" if report_request.last == EVERYTHING else report_request.last,
         "paper": None if report_request.paper is Paper.A4 else report_request.paper.value,
         "timezone": report_request.zone,

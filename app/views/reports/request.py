@@ -6,10 +6,11 @@ from datetime import UTC, datetime, timedelta
 from enum import StrEnum
 from zoneinfo import ZoneInfo
 
+from app.core.period import ALWAYS, Period
 from app.core.spc import USUAL_READINGS
 from app.errors import FieldError, Invalid
 from app.files.documents.content import Paper
-from app.files.formats import cell_values
+from app.files.formats import cell_values, periods
 from app.language.i18n import _
 from app.language.times import plant_zone
 
@@ -49,10 +50,9 @@ def _in_every_zone(moment: datetime) -> bool:
 
 @dataclass(frozen=True)
 class ReportRequest:
-    """Request for a report. `last`: only the last so many readings; of them those measured from `start` to `end`."""
+    """Request for a report. `last`: only the last so many readings; of them those measured in the period."""
 
-    start: datetime | None = None
-    end: datetime | None = None
+    period: Period = ALWAYS
     last: int | None = None
     sections: Sequence[SectionName] = field(default=tuple(SectionName))
     paper: Paper = Paper.A4
@@ -60,15 +60,10 @@ class ReportRequest:
 
     def __post_init__(self) -> None:
         """Raises `Invalid` for a period that runs backwards and for a time zone that there is not."""
-        errors = []
-        if self.start is not None and self.end is not None and self.start > self.end:
-            message = _("{start} is later than `to` {end}; exchange the two").format(
-                start=self.start.isoformat(), end=self.end.isoformat()
-            )
-            errors.append(FieldError("from", message))
-        errors += [
+        periods.in_order(self.period)
+        errors = [
             FieldError(name, _("lies outside the years 1 to 9999"))
-            for name, at in (("from", self.start), ("to", self.end))
+            for name, at in zip(periods.NAMES, self.period, strict=True)
             if at is not None and not _in_every_zone(at)
         ]
         try:
@@ -85,7 +80,15 @@ class ReportRequest:
     @property
     def newest(self) -> int | None:
         """Number of the last readings in the report; `LAST` where nothing else was asked for."""
-        return LAST if self.last is None and self.start is None and self.end is None else self.last
+        return LAST if self.last is None and not self.period.bounded else self.last
+
+
+def zone_or_plants(name: str | None) -> ZoneInfo:
+    """The time zone of this name; the plant's without one, or where there is no such zone, which the request then says."""
+    try:
+        return cell_values.zone_named(name) if name else plant_zone()
+    except (cell_values.Unreadable, ValueError):
+        return plant_zone()
 
 
 def section_names(names: Sequence[str]) -> tuple[SectionName, ...]:
@@ -110,13 +113,11 @@ def typed(fields: Mapping[str, str], sections: Sequence[str]) -> ReportRequest:
         zone = cell_values.zone_named(fields.get("timezone", "").strip() or plant_zone().key)
     except (cell_values.Unreadable, ValueError) as error:
         errors.append(FieldError("timezone", str(error)))
-    moments: dict[str, datetime | None] = {}
-    for name in ("from", "to"):
-        text = fields.get(name, "").strip()
-        try:
-            moments[name] = cell_values.moment(text, zone, fold=1 if name == "to" else 0) if text else None
-        except cell_values.Unreadable as error:
-            errors.append(FieldError(name, str(error)))
+    period = ALWAYS
+    try:
+        period = periods.period_of(fields, zone)
+    except Invalid as error:
+        errors += error.errors
     last = fields.get("last", "").strip()
     if last and last != "all" and not (last.isascii() and last.isdigit() and 0 < int(last) < 10**15):
         errors.append(FieldError("last", _("must be a whole number from 1 on, or `all`")))
@@ -127,8 +128,7 @@ def typed(fields: Mapping[str, str], sections: Sequence[str]) -> ReportRequest:
         detail = "; ".join(f"{error.field}: {error.message}" for error in errors)
         raise Invalid(detail, _("Correct the named fields."), errors=errors)
     return ReportRequest(
-        start=moments.get("from"),
-        end=moments.get("to"),
+        period=period,
         last=EVERYTHING if last == "all" else int(last) if last else None,
         sections=section_names(sections),
         paper=Paper(paper),

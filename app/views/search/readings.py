@@ -16,6 +16,8 @@ from sqlalchemy.orm import Session
 
 from app.core.decision.limits import Zone
 from app.core.decision.step import Action
+from app.core.period import ALWAYS, Period
+from app.db.period import in_period
 from app.errors import FieldError, Invalid
 from app.language.i18n import _
 from app.loop.characteristics.queries import characteristic_named
@@ -39,8 +41,7 @@ class Filters(NamedTuple):
     entry: Entry | None = None
     machine_id: int | None = None
     part: str | None = None
-    start: datetime | None = None
-    end: datetime | None = None
+    period: Period = ALWAYS
     zones: Sequence[Zone] = ()
     actions: Sequence[Action] = ()
 
@@ -50,10 +51,8 @@ class Filters(NamedTuple):
         conditions: list[ColumnElement[bool]] = []
         if self.part is not None:
             conditions.append(Reading.part == self.part)
-        if self.start is not None:
-            conditions.append(Reading.measured_at >= self.start)
-        if self.end is not None:
-            conditions.append(Reading.measured_at <= self.end)
+        if self.period.bounded:
+            conditions.append(in_period(Reading.measured_at, self.period))
         if self.zones:
             conditions.append(Reading.zone.in_(self.zones))
         if self.actions:
@@ -106,9 +105,9 @@ def _of_one(session: Session, entry: Entry, filters: Filters, order: Order, at: 
         Reading.characteristic_id == entry.characteristic_id,
         *filters.conditions,
     ]
-    if filters.start is not None or filters.end is not None:
+    if filters.period.bounded:
         characteristic = characteristic_named(session, entry.characteristic).characteristic
-        window = window_of(session, characteristic, start=filters.start, end=filters.end)
+        window = window_of(session, characteristic, period=filters.period)
         conditions.append(Reading.sequence.between(window.first, window.last))
     if at is not None:
         conditions.append(Reading.sequence > at if order == "oldest" else Reading.sequence < at)
@@ -142,8 +141,8 @@ def _begin(session: Session, filters: Filters, order: Order, at: Sequence[int] |
         first = _arrival(at)
     else:
         first = (first_arrival if order == "oldest" else last_arrival)(session, filters.machine_id)
-    period = filters.start if order == "oldest" else filters.end
-    begin = first if period is None else (max if order == "oldest" else min)(first, period)
+    bound = filters.period.start if order == "oldest" else filters.period.end
+    begin = first if bound is None else (max if order == "oldest" else min)(first, bound)
     return min(max(begin, EARLIEST), datetime.now(UTC))
 
 

@@ -13,9 +13,9 @@ from app.loop.readings.queries import entry_for
 from app.views.search import readings
 from app.views.search.parts import Part
 from app.web.api import Limit, MachineFilter, api_router, problems
-from app.web.choice import check_order
+from app.web.choice import InPeriod
 from app.web.deps import FROM_REPLICA, SessionDep
-from app.web.fields import Moment, Page
+from app.web.fields import Page
 
 router = api_router("readings", FROM_REPLICA)
 CURSOR = r"^[0-9]{1,19}(-[0-9]{1,19}){0,3}$"
@@ -25,6 +25,7 @@ CURSOR = r"^[0-9]{1,19}(-[0-9]{1,19}){0,3}$"
 def list_readings(
     session: SessionDep,
     caller: AnyCaller,
+    period: InPeriod,
     characteristic: Annotated[
         str | None, Query(description="Only of the characteristic with this key.", examples=["shaft-d40"])
     ] = None,
@@ -32,8 +33,6 @@ def list_readings(
     part: Annotated[
         Part | None, Query(description="Only of this part, named exactly so.", examples=["SN-000812"])
     ] = None,
-    start: Annotated[Moment | None, Query(alias="from", description="Measured at this moment or later.")] = None,
-    end: Annotated[Moment | None, Query(alias="to", description="Measured at this moment or earlier.")] = None,
     zone: Annotated[list[Zone], Query(description="Only of this zone; of several if repeated.")] = [],  # noqa: B006 - FastAPI copies it
     action: Annotated[list[Action], Query(description="Only those that asked for this; repeat it for several.")] = [],  # noqa: B006 - as above
     order: Annotated[readings.Order, Query(description="Which come first, by arrival.")] = "oldest",
@@ -50,12 +49,11 @@ def list_readings(
 
     The key of a machine sees those of that machine. What is rare in millions of readings is found faster within a period.
     """
-    check_order(start, end)
     entry = entry_for(session, caller, characteristic) if characteristic is not None else None
     machine_id = only_machine(session, caller, machine)
     if entry is not None and machine_id not in (None, entry.machine_id):
         return Page(items=[])
-    filters = readings.Filters(entry, machine_id, part, start, end, zone, action)
+    filters = readings.Filters(entry, machine_id, part, period, zone, action)
     records = readings.found(session, filters, order, after, limit + 1)
     shown = records[:limit]
     items = [ReadingRow.model_validate(row) for row in readings.answers(session, shown)]

@@ -12,7 +12,7 @@ from tests.shop import Person, Shop
 from tests.views.reports.story import facts, report, scatter, table
 
 HOUR = "2026-11-21T{:02d}:{:02d}:00Z"
-PERIOD = "from=2026-11-21T09:00:00Z&to=2026-11-21T09:59:00Z"
+PERIOD = "from=2026-11-21T09:00:00Z&to=2026-11-21T10:00:00Z"
 # Thirty from eight, sixty from nine, thirty from ten; of each hour one comes late (or its clock is fast), far out.
 LATE = {50: (8, 7.5), 70: (10, -7.0), 100: (9, 6.0), 110: (9, 5.5)}
 MEANT = [*range(31, 50), *range(51, 70), *range(71, 91), 100, 110]

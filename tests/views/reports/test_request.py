@@ -4,6 +4,7 @@ from datetime import datetime
 
 import pytest
 
+from app.core.period import Period
 from app.errors import Invalid
 from app.views.reports.request import ReportRequest
 
@@ -12,4 +13,4 @@ from app.views.reports.request import ReportRequest
 @pytest.mark.parametrize("end", ["start", "end"])
 def test_a_moment_that_some_time_zone_cannot_write_is_refused_in_words(moment: str, end: str) -> None:
     with pytest.raises(Invalid, match="years 1 to 9999"):
-        ReportRequest(**{end: datetime.fromisoformat(moment)})  # type: ignore[arg-type]
+        ReportRequest(Period(**{end: datetime.fromisoformat(moment)}))

@@ -82,8 +82,8 @@ def test_machines_together_by_arrival(lathes: TwoLathes) -> None:
 def test_period_zone_and_action(lathes: TwoLathes) -> None:
     one, two, other = lathes.characteristic, f"{lathes.characteristic}-b", lathes.other.characteristic
     late = [(one, 5), (two, 5), (one, 6), (two, 6), (other, 1), (other, 2)]
-    assert sorted(listed(lathes, **{"from": at(4), "to": at(62)})) == sorted(late)
-    assert listed(lathes, characteristic=one, **{"from": at(1), "to": at(3)}, order="newest") == [
+    assert sorted(listed(lathes, **{"from": at(4), "to": at(63)})) == sorted(late)
+    assert listed(lathes, characteristic=one, **{"from": at(1), "to": at(4)}, order="newest") == [
         (one, 4),
         (one, 3),
         (one, 2),

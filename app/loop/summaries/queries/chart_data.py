@@ -86,8 +86,7 @@ def chart_data_of(session: Session, characteristic: Characteristic, window: Wind
     blocks = [
         block
         for block in sorted(blocks, key=lambda block: block.first)
-        if (window.end is None or block.first_at <= window.end)
-        and (window.start is None or block.last_at >= window.start)
+        if window.period.touches(block.first_at, block.last_at)
     ]
     readings: list[ChartReading] = []
     excluded: set[int] = set()

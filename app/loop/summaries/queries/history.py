@@ -159,12 +159,12 @@ def _columns(
             SELECT {packed} FROM reading r
             WHERE machine_id = %(machine)s AND characteristic_id = %(characteristic)s
                 AND sequence BETWEEN greatest(at * {BLOCK}, %(first)s) AND least(at * {BLOCK} + {BLOCK - 1}, %(last)s)
-                {"AND measured_at >= %(start)s" if window.start is not None else ""}
-                {"AND measured_at <= %(end)s" if window.end is not None else ""}
+                {"AND measured_at >= %(start)s" if window.period.start is not None else ""}
+                {"AND measured_at < %(end)s" if window.period.end is not None else ""}
         ) AS block
     """  # noqa: S608 - made of our own names
     bounds: dict[str, Any] = {"machine": characteristic.machine_id, "characteristic": characteristic.id}
-    bounds |= {"first": window.first, "last": window.last, "start": window.start, "end": window.end}
+    bounds |= {"first": window.first, "last": window.last, **window.period._asdict()}
     rows: list[Any] = []
     if window.count:
         # As bytes, not as the text that bytes are written in: half of what travels, and nothing to decode.

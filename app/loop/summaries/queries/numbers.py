@@ -12,6 +12,7 @@ from sqlalchemy import text
 from sqlalchemy.orm import Session
 
 from app.core.decision.limits import FAULT, Zone, nanometres, nanometres_sql, within, within_sql
+from app.db.period import in_period_sql
 from app.loop.summaries.queries.chart_data import excluded_of
 from app.loop.summaries.queries.pyramid import Block, Run, cover_of
 from app.loop.summaries.queries.window import Window
@@ -35,8 +36,7 @@ JOIN reading r ON r.machine_id = :machine AND r.characteristic_id = :characteris
 JOIN unnest(CAST(:versions AS int[]), CAST(:tolerances AS bigint[])) AS v(version, tolerance)
     ON v.version = r.parameters_version
 CROSS JOIN LATERAL (SELECT CASE WHEN {_OF_A_PART} THEN r.deviation END) AS part(d)
-WHERE (CAST(:start AS timestamptz) IS NULL OR r.measured_at >= :start)
-  AND (CAST(:end AS timestamptz) IS NULL OR r.measured_at <= :end)
+WHERE {in_period_sql("r.measured_at")}
   AND NOT r.sequence = ANY(CAST(:excluded AS bigint[]))
 """  # noqa: S608 - made of the names of our zones
 
@@ -46,10 +46,15 @@ SELECT width_bucket({nanometres_sql("deviation")}, CAST(:edges AS float8[])) AS 
 FROM reading r
 WHERE machine_id = :machine AND characteristic_id = :characteristic AND sequence BETWEEN :first AND :last
   AND {_OF_A_PART} AND NOT sequence = ANY(CAST(:excluded AS bigint[]))
-  AND (CAST(:start AS timestamptz) IS NULL OR measured_at >= :start)
-  AND (CAST(:end AS timestamptz) IS NULL OR measured_at <= :end)
+  AND {in_period_sql("measured_at")}
 GROUP BY bar
 """  # noqa: S608 - made of the names of our zones
+
+
+_EXCLUDED = f"""
+SELECT count(*) FROM reading WHERE machine_id = :machine AND characteristic_id = :characteristic
+    AND sequence = ANY(CAST(:excluded AS bigint[])) AND {in_period_sql("measured_at")}
+"""  # noqa: S608 - made of our own names
 
 
 @dataclass(frozen=True, slots=True)
@@ -120,8 +125,7 @@ def numbers_of(session: Session, characteristic: Characteristic, window: Window)
             characteristic,
             window.first,
             window.last,
-            start=window.start,
-            end=window.end,
+            window.period,
             without=excluded,
             settles=lambda block: (
                 within(nanometres(max(-block.minimum, block.maximum)), tightest) and not block.zones[FAULT]
@@ -138,8 +142,7 @@ def numbers_of(session: Session, characteristic: Characteristic, window: Window)
                 "lasts": [last for _first, last in runs],
                 "versions": list(tolerances),
                 "tolerances": list(tolerances.values()),
-                "start": window.start,
-                "end": window.end,
+                **window.period._asdict(),
             },
         ).one()
         measured, mean, squares, minimum, maximum, corrections, in_tolerance, *zones = row
@@ -194,18 +197,12 @@ def _excluded_in_time(session: Session, characteristic: Characteristic, excluded
         return len(excluded)
     return int(
         session.execute(
-            text(
-                "SELECT count(*) FROM reading WHERE machine_id = :machine AND characteristic_id = :characteristic "
-                "AND sequence = ANY(CAST(:excluded AS bigint[])) "
-                "AND (CAST(:start AS timestamptz) IS NULL OR measured_at >= :start) "
-                "AND (CAST(:end AS timestamptz) IS NULL OR measured_at <= :end)"
-            ),
+            text(_EXCLUDED),
             {
                 "machine": characteristic.machine_id,
                 "characteristic": characteristic.id,
                 "excluded": list(excluded),
-                "start": window.start,
-                "end": window.end,
+                **window.period._asdict(),
             },
         ).scalar_one()
     )
@@ -229,8 +226,7 @@ def histogram_of(session: Session, characteristic: Characteristic, window: Windo
             "last": window.last,
             "excluded": list(excluded_of(session, characteristic, first, window.last)),
             "edges": list(edges),
-            "start": window.start,
-            "end": window.end,
+            **window.period._asdict(),
         },
     )
     for bar, count in rows:

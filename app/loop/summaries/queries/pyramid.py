@@ -11,6 +11,7 @@ from sqlalchemy import select, text
 from sqlalchemy.orm import Session
 
 from app.core.decision.limits import FAULT, Zone
+from app.core.period import ALWAYS, Period
 from app.loop.tables.characteristics import Characteristic
 from app.loop.tables.readings import ReadingSummary
 
@@ -138,18 +139,16 @@ def cover_of(
     characteristic: Characteristic,
     first: int,
     last: int,
+    period: Period = ALWAYS,
     *,
-    start: datetime | None = None,
-    end: datetime | None = None,
     without: Sequence[int] = (),
     settles: Callable[[Block], bool] = lambda _block: True,
 ) -> Cover:
-    """Walk down the pyramid over the sequences first … last, measured from `start` to `end`.
+    """Walk down the pyramid over the sequences first … last, measured in the period.
 
     A block counts as a whole if it lies inside, holds none of the sequences `without` (ascending), and `settles` what is
     asked; otherwise its four parts are looked at, at last the readings themselves.
     """
-    timed = start is not None or end is not None
     blocks: list[Block] = []
     numbers: list[int] = list(range((first - 1) >> TOP_LEVEL, ((last - 1) >> TOP_LEVEL) + 1)) if last >= first else []
     for level in range(TOP_LEVEL, BASE_LEVEL - 1, -FAN):
@@ -158,7 +157,7 @@ def cover_of(
         for number in numbers:
             inside = first <= (number << level) + 1 and (number + 1) << level <= last
             clean = not _any_between(without, (number << level) + 1, (number + 1) << level)
-            if timed or (inside and clean):
+            if period.bounded or (inside and clean):
                 whole.append(number)
             else:
                 descend.add(number)
@@ -167,13 +166,12 @@ def cover_of(
             block = there.get(number)
             if block is None:
                 descend.add(number)
-            elif (start is not None and block.last_at < start) or (end is not None and block.first_at > end):
+            elif not period.touches(block.first_at, block.last_at):
                 continue
             elif (
                 first <= block.first
                 and block.last <= last
-                and (start is None or block.first_at >= start)
-                and (end is None or block.last_at <= end)
+                and period.covers(block.first_at, block.last_at)
                 and not _any_between(without, block.first, block.last)
                 and settles(block)
             ):

@@ -7,6 +7,7 @@ from typing import NamedTuple
 from sqlalchemy import ColumnElement, Float, Integer, func, select, text
 from sqlalchemy.orm import Session
 
+from app.db.period import in_period_sql
 from app.loop.summaries.queries.chart_data import MOST_BLOCKS, MOST_READINGS, excluded_of, single_readings
 from app.loop.summaries.queries.window import Window
 from app.loop.tables.characteristics import Characteristic
@@ -86,15 +87,14 @@ def results_of(session: Session, characteristic: Characteristic, window: Window,
     return ResultCourse([ResultBlock(*row) for row in session.execute(query)], [], frozenset())
 
 
-_REJECTS = """
+_REJECTS = f"""
 SELECT count(*) FILTER (WHERE o.rejected), coalesce(sum(o.sections_outside), 0) FROM reading_results o
 WHERE o.machine_id = :machine AND o.characteristic_id = :characteristic AND o.sections_outside > 0
     AND o.sequence BETWEEN :first AND :last AND NOT o.sequence = ANY(CAST(:excluded AS bigint[]))
     AND (CAST(:start AS timestamptz) IS NULL AND CAST(:end AS timestamptz) IS NULL OR EXISTS (
         SELECT FROM reading r WHERE r.machine_id = o.machine_id AND r.characteristic_id = o.characteristic_id
-            AND r.sequence = o.sequence AND (CAST(:start AS timestamptz) IS NULL OR r.measured_at >= :start)
-            AND (CAST(:end AS timestamptz) IS NULL OR r.measured_at <= :end)))
-"""
+            AND r.sequence = o.sequence AND {in_period_sql("r.measured_at")}))
+"""  # noqa: S608 - made of our own names
 
 
 def rejects_of(session: Session, characteristic: Characteristic, window: Window) -> Rejects:
@@ -108,8 +108,7 @@ def rejects_of(session: Session, characteristic: Characteristic, window: Window)
             "first": window.first,
             "last": window.last,
             "excluded": list(excluded),
-            "start": window.start,
-            "end": window.end,
+            **window.period._asdict(),
         },
     ).one()
     return Rejects(int(rows[0]), int(rows[1]))

@@ -1,14 +1,13 @@
 """Windows of readings: by number, or by the time of measurement."""
 
 from dataclasses import dataclass, replace
-from datetime import UTC, datetime
 
-import numpy as np
-from numpy.typing import NDArray
-from sqlalchemy import ColumnElement, and_, exists, func, select, true
+from sqlalchemy import ColumnElement, exists, func, select
 from sqlalchemy.orm import Session
 
 from app.core.decision.limits import Zone
+from app.core.period import ALWAYS, Period
+from app.db.period import in_period
 from app.loop.summaries.queries.pyramid import Run, cover_of
 from app.loop.tables.characteristics import Characteristic
 from app.loop.tables.readings import Exclusion, Reading, Stream
@@ -21,15 +20,14 @@ MOST_COUNTED = 100_000
 class Window:
     """A run of readings, first and last included; empty if last < first. `newest` is the stream's last sequence.
 
-    start, end: of the run only those measured from … to are meant. A reading that came late lies between others of another
-    time; so whoever counts, counts by these too.
+    period: of the run only those measured in it are meant. A reading that came late lies between others of another time; so
+    whoever counts, counts by it too.
     """
 
     first: int
     last: int
     newest: int
-    start: datetime | None = None
-    end: datetime | None = None
+    period: Period = ALWAYS
 
     @property
     def count(self) -> int:
@@ -41,31 +39,12 @@ class Window:
 
     @property
     def timed(self) -> bool:
-        return self.start is not None or self.end is not None
+        return self.period.bounded
 
     @property
     def in_time(self) -> ColumnElement[bool]:
-        """Measured from start to end, as a condition on `Reading`."""
-        conditions = []
-        if self.start is not None:
-            conditions.append(Reading.measured_at >= self.start)
-        if self.end is not None:
-            conditions.append(Reading.measured_at <= self.end)
-        return and_(true(), *conditions)
-
-    def holds(self, measured_at: NDArray[np.datetime64]) -> NDArray[np.bool_]:
-        """Mask of the moments (UTC) from start to end."""
-        held = np.ones(len(measured_at), np.bool_)
-        if self.start is not None:
-            held &= measured_at >= moment_of(self.start)
-        if self.end is not None:
-            held &= measured_at <= moment_of(self.end)
-        return held
-
-
-def moment_of(at: datetime) -> np.datetime64:
-    """As NumPy keeps it, in UTC."""
-    return np.datetime64(at.astimezone(UTC).replace(tzinfo=None), "us")
+        """Measured in the period, as a condition on `Reading`."""
+        return in_period(Reading.measured_at, self.period)
 
 
 def newest_of(session: Session, characteristic: Characteristic) -> int:
@@ -87,11 +66,10 @@ def window_of(
     last: int | None = None,
     first: int | None = None,
     through: int | None = None,
-    start: datetime | None = None,
-    end: datetime | None = None,
+    period: Period = ALWAYS,
     usable: bool = False,
 ) -> Window:
-    """The readings first … through; of them the `last` so many; of them those measured in start … end.
+    """The readings first … through; of them the `last` so many; of them those measured in the period.
 
     usable: neither excluded readings nor probe faults count for `last`, up to `MOST_COUNTED`, so that an index of the last
     1000 stays one of 1000 readings when somebody excludes one.
@@ -101,10 +79,10 @@ def window_of(
     if last is not None:
         low = max(low, _last_usable(session, characteristic, low, high, last) if usable else high - last + 1)
     window = Window(low, high, newest)
-    if start is None and end is None:
+    if not period.bounded:
         return window
-    window = replace(window, start=start, end=end)
-    cover = cover_of(session, characteristic, low, high, start=start, end=end)
+    window = replace(window, period=period)
+    cover = cover_of(session, characteristic, low, high, period)
     ends = [end for block in cover.blocks for end in (block.first, block.last)]
     ends += _ends_in_time(session, characteristic, cover.runs, window)
     return replace(window, first=min(ends, default=1), last=max(ends, default=0))

@@ -10,6 +10,7 @@ from sqlalchemy import ColumnElement, select
 from sqlalchemy.orm import InstrumentedAttribute, Session
 
 from app.core.parameters import Parameters
+from app.core.period import Period
 from app.loop.characteristics import queries as characteristics
 from app.loop.characteristics.queries import CurrentCharacteristic
 from app.loop.summaries import queries as statistics
@@ -50,12 +51,7 @@ class Frame:
         """The readings measured in the period."""
         request = self.request
         return statistics.window_of(
-            self.session,
-            self.current.characteristic,
-            last=request.newest,
-            start=request.start,
-            end=request.end,
-            usable=True,
+            self.session, self.current.characteristic, last=request.newest, period=request.period, usable=True
         )
 
     @cached_property
@@ -106,15 +102,16 @@ class Frame:
         return End(*row)
 
     @cached_property
-    def span(self) -> tuple[datetime, datetime] | None:
+    def span(self) -> Period | None:
         """From when to when: the period that was asked for, else that of its readings; None if neither says."""
-        start, end = self.request.start, self.request.end
-        if self.ends is not None:
-            start = start or min(self.ends[0].measured_at, self.ends[0].received_at)
-            end = end or (self.now if self.window.reaches_now else self.ends[1].received_at)
-        if start is None or end is None:
-            return (start or HISTORY_BEGINS, end or self.now) if start or end else None
-        return start, end
+        start, end = self.request.period
+        if self.ends is None:
+            return Period(start or HISTORY_BEGINS, end or self.now) if self.request.period.bounded else None
+        first, last = self.ends
+        of_readings = Period.through(
+            min(first.measured_at, first.received_at), self.now if self.window.reaches_now else last.received_at
+        )
+        return Period(start or of_readings.start, end or of_readings.end)
 
     @cached_property
     def versions(self) -> Sequence[ParametersVersion]:

@@ -91,15 +91,11 @@ def _section(frame: Frame, name: SectionName) -> Section | None:
 def _period(frame: Frame) -> str:
     """The period in words, as it stands on every page."""
     request, ends, zone = frame.request, frame.ends, ZoneInfo(frame.request.zone)
-    period = " – ".join(moment(at).words(zone) if at is not None else "…" for at in (request.start, request.end))
+    period = " – ".join(moment(at).words(zone) if at is not None else "…" for at in request.period)
     if ends is None:
-        return (
-            _("no readings")
-            if request.start is None and request.end is None
-            else _("{period}, no readings").format(period=period)
-        )
+        return _("no readings") if not request.period.bounded else _("{period}, no readings").format(period=period)
     measured = " – ".join(moment(end.measured_at).words(zone) for end in ends)
-    span = measured if request.start is None and request.end is None else period
+    span = period if request.period.bounded else measured
     return _("{span}, readings {first} to {last}").format(span=span, first=ends[0].sequence, last=ends[1].sequence)
 
 

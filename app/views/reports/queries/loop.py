@@ -4,6 +4,7 @@ from functools import partial
 
 from sqlalchemy import func, select
 
+from app.db.period import in_period
 from app.files.documents.content import Column, Fact, Picture, Section, Table, count, deviation, moment, size, words
 from app.language.i18n import _
 from app.loop.tables.tools import Correction, ToolEvent
@@ -82,7 +83,7 @@ def tools(frame: Frame) -> Section | None:
             ToolEvent.machine_id == frame.current.machine.id,
             ToolEvent.number.in_(numbers),
             ToolEvent.kind != "correction",
-            ToolEvent.at.between(*frame.span),
+            in_period(ToolEvent.at, frame.span),
         )
         .order_by(ToolEvent.id.desc())
         .limit(MOST_ROWS + 1)

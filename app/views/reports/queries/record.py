@@ -3,6 +3,7 @@
 from sqlalchemy import func, or_, select
 
 from app.core.parameters import BY_NAME
+from app.db.period import in_period
 from app.files.documents.content import Column, Fact, Section, Table, count, deviation, moment, size, words
 from app.language.i18n import _
 from app.loop.alarm_response import wording as alarm_wording
@@ -26,7 +27,7 @@ def alarms(frame: Frame) -> Section:
     own = (Alarm.characteristic_id == frame.current.characteristic.id) & frame.holds(Alarm.sequence)
     which = [own]
     if frame.span is not None:
-        in_time = Alarm.raised_at.between(*frame.span)
+        in_time = in_period(Alarm.raised_at, frame.span)
         which.append((Alarm.characteristic_id == frame.current.characteristic.id) & Alarm.sequence.is_(None) & in_time)
         which.append(Alarm.characteristic_id.is_(None) & Alarm.tool_memory.in_(tools) & in_time)
     here = (Alarm.machine_id == frame.current.machine.id, or_(*which))
@@ -76,7 +77,7 @@ def notes(frame: Frame) -> Section | None:
     """Notes on the charts of the period, the last moment first; nothing where nobody has written one."""
     here = [Note.sequence.is_not(None) & frame.holds(Note.sequence)]
     if frame.span is not None:
-        here.append(Note.sequence.is_(None) & Note.at.between(*frame.span))
+        here.append(Note.sequence.is_(None) & in_period(Note.at, frame.span))
     chosen = (
         Note.machine_id == frame.current.machine.id,
         on_charts_of(frame.current.characteristic.id),
@@ -117,7 +118,7 @@ def parameters(frame: Frame) -> Section:
     changed = [
         (version, differences)
         for version, differences in wording.history(frame.versions)
-        if version.version > 1 and span is not None and span[0] <= version.created_at <= span[1]
+        if version.version > 1 and span is not None and span.covers(version.created_at, version.created_at)
     ]
     table = Table(
         (

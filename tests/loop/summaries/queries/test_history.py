@@ -12,6 +12,7 @@ from sqlalchemy.orm import Session
 
 from app.core.decision.limits import Zone
 from app.core.decision.step import Code
+from app.core.period import Period
 from app.errors import Invalid
 from app.loop.characteristics import queries as characteristics
 from app.loop.summaries import queries
@@ -133,10 +134,10 @@ def test_a_period_takes_what_was_measured_in_it(server: Server, filled: str) -> 
         whole = Window(1, COUNT, COUNT)
         every = queries.history_of(session, characteristic, whole, ["measured_at"])
         start = every["measured_at"][9].item().replace(tzinfo=UTC)
-        period = replace(whole, start=start, end=start + timedelta(seconds=4))
+        period = replace(whole, period=Period(start, start + timedelta(seconds=5)))
         found = queries.history_of(session, characteristic, period)
         assert found["sequence"].tolist() == [10, 11, 12, 13, 14]
-        never = replace(whole, start=datetime(2099, 1, 1, tzinfo=UTC))
+        never = replace(whole, period=Period(datetime(2099, 1, 1, tzinfo=UTC)))
         nothing = queries.history_of(session, characteristic, never, COLUMNS)
         empty = queries.history_of(session, characteristic, Window(1, 0, COUNT), COLUMNS)
     assert len(nothing) == len(empty) == 0

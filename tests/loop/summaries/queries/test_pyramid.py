@@ -14,6 +14,7 @@ from hypothesis import strategies as st
 from sqlalchemy import text
 from sqlalchemy.orm import Session
 
+from app.core.period import Period
 from app.loop.characteristics import queries as characteristics
 from app.loop.characteristics.queries import CurrentCharacteristic
 from app.loop.summaries import queries
@@ -204,13 +205,13 @@ class TestNumbers:
 
     def test_the_excluded_are_counted_apart(self, large: Large) -> None:
         assert large.numbers(large.window()).excluded == 4
-        early = large.numbers(replace(large.window(), end=BEGUN + timedelta(seconds=1_000)))
+        early = large.numbers(replace(large.window(), period=Period(None, BEGUN + timedelta(seconds=1_000))))
         assert (early.excluded, early.count) == (2, 998)
 
     def test_a_window_by_time_holds_all_that_was_measured_in_it(self, large: Large) -> None:
-        window = large.window(start=BEGUN + timedelta(seconds=99.5), end=BEGUN + timedelta(seconds=180_000))
+        window = large.window(period=Period(BEGUN + timedelta(seconds=99.5), BEGUN + timedelta(seconds=180_001)))
         assert (window.first, window.last) == (100, 180_000)
-        assert large.window(start=BEGUN + timedelta(days=365)).count == 0
+        assert large.window(period=Period(BEGUN + timedelta(days=365))).count == 0
 
 
 def test_the_histogram_is_that_of_the_readings(large: Large) -> None:
