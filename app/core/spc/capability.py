@@ -345,7 +345,7 @@ def percentile(
 
     >>> c = percentile(np.arange(2001.0), Limits(-500, 2500))
     >>> round(c.median), round(c.ppk.value, 3), c.ppk.low, round(c.ppk.high, 3)
-    (1000, 1.503, None, 1.508)
+    (1000, 1.503, None, 1.509)
     """
     x = np.sort(checked(values, at_least=max(2, minimum)))
     low, median, high = (float(quantile) for quantile in np.quantile(x, [BELOW, 0.5, ABOVE], method="median_unbiased"))
