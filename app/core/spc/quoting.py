@@ -3,7 +3,9 @@
 =============  ==================================================================================================
 Cpk            a stable, normal process that is resolved finely enough, of 100 readings and more
 Ppk            any other process whose readings are normal
-percentiles    readings that are not normal (ISO 22514-2), of 100 and more
+fitted         readings that are not normal, by the distribution that fits them (ISO 22514-2), of 100 and more; at a natural
+               limit also where it fits better than a normal one
+percentiles    those that no distribution fits, by their own percentiles, of 100 and more
 none           no index was computed, a reading lies far from all others, or no distribution carries one
 =============  ==================================================================================================
 """
@@ -23,6 +25,7 @@ from app.core.spc.capability import (
     capability,
     percentile,
 )
+from app.core.spc.fitting import Fitted, fitted
 from app.core.spc.in_time import InTime
 from app.core.spc.refusal import Floats, Refused
 from app.core.spc.spread import far_off
@@ -36,6 +39,7 @@ class Quote(StrEnum):
 
     CPK = "cpk"
     PPK = "ppk"
+    FITTED = "fitted"
     PERCENTILE = "percentile"
     NONE = "none"
 
@@ -73,17 +77,20 @@ def quoting(
     *,
     stable: bool | None,
     far: bool,
+    by_fit: Fitted | Refused | None = None,
 ) -> Quoting:
     """Decide which index may be quoted.
 
     stable: of the process in time, None where too little is known. far: a reading lies far from all others, so that the
-    readings are of two processes and no index describes both.
+    readings are of two processes and no index describes both. by_fit: of `fit_if_needed`.
     """
     if isinstance(indices, Refused):
         return Quoting(Quote.NONE, why=indices.reason.value)
     if far:
         return Quoting(Quote.NONE, why=WhyNot.FAR_OFF.value)
     few = Caution.FEW_READINGS in indices.cautions
+    if isinstance(by_fit, Fitted):
+        return _of(Quote.FITTED, by_fit.ppk, few)
     if Caution.NOT_NORMAL in indices.cautions:
         if isinstance(by_percentile, Refused):
             return Quoting(Quote.NONE, why=WhyNot.NO_SHAPE.value)
@@ -111,7 +118,25 @@ def quoting_of(values: Floats, limits: Limits) -> Quoting:
     result = or_refused(lambda: capability(values, limits))
     control, time = or_refused(lambda: stability.of_readings(values)), or_refused(lambda: in_time.in_time(values))
     by_percentile = or_refused(lambda: percentile(values, limits, minimum=ENOUGH_READINGS))
-    return quoting(result, by_percentile, stable=stable(control, time), far=bool(far_off(values).any()))
+    by_fit = fit_if_needed(values, limits, result)
+    return quoting(result, by_percentile, stable=stable(control, time), far=bool(far_off(values).any()), by_fit=by_fit)
+
+
+def fit_if_needed(
+    values: Floats, limits: Limits, indices: Capability | Refused, *, side: int = 0, confidence: float = 0.95
+) -> Fitted | Refused | None:
+    """The distribution that fits, or why none does; None where the normal one does. side: of a natural limit, as for `fitted`.
+
+    At a natural limit one that fits better than the normal one is taken though the readings look normal: of a few hundred
+    readings nobody can tell, and the normal one knows nothing of the limit.
+    """
+    normal = not isinstance(indices, Refused) and Caution.NOT_NORMAL not in indices.cautions
+    if isinstance(indices, Refused) or (normal and side == 0):
+        return None
+    found = or_refused(lambda: fitted(values, limits, side=side, confidence=confidence))
+    if normal and (isinstance(found, Refused) or not found.beats_normal):
+        return None
+    return found
 
 
 def or_refused(compute: Callable[[], Result]) -> Result | Refused:

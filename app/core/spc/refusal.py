@@ -20,6 +20,7 @@ class Reason(StrEnum):
     LIMITS_CROSSED = "limits_crossed"
     INCOMPLETE_STUDY = "incomplete_study"
     BEYOND_RANGE = "beyond_range"
+    NO_DISTRIBUTION = "no_distribution"
 
 
 class Refused(ValueError):

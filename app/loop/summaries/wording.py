@@ -170,6 +170,8 @@ def refusal(refused: Refused) -> str:
             return _("The study is incomplete: {have} {what} of at least {needed}.").format(
                 have=refused.have, needed=refused.needed, what=_study_part(refused.what)
             )
+        case Reason.NO_DISTRIBUTION:
+            return _("None of the distributions that are known here fits the readings.")
         case Reason.BEYOND_RANGE:
             return _("This is beyond what can be computed here; ask for less at once.")
 

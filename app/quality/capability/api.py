@@ -5,6 +5,7 @@ from typing import Annotated, Literal
 from fastapi import Query, Response
 
 from app.access.deps import AnyCaller
+from app.core.spc.fitting import Fitted
 from app.core.spc.refusal import Refused
 from app.loop.characteristics import queries as characteristics
 from app.quality.capability.figures import CapabilityChart, histogram, probability
@@ -20,7 +21,8 @@ router = api_router("statistics", FROM_REPLICA)
 def drawn(study: Study) -> CapabilityChart:
     """Values of the capability figure."""
     result = None if isinstance(study.indices, Refused) else study.indices
-    by_percentile = None if isinstance(study.by_percentile, Refused) else study.by_percentile
+    fitted = study.by_fit if isinstance(study.by_fit, Fitted) else None
+    by_percentile = fitted or (None if isinstance(study.by_percentile, Refused) else study.by_percentile)
     return CapabilityChart(
         study.values,
         study.limits,
@@ -29,6 +31,7 @@ def drawn(study: Study) -> CapabilityChart:
         result.within.value if result and study.potential_allowed else None,
         (by_percentile.low, by_percentile.median, by_percentile.high) if by_percentile else None,
         study.normal or result is None,
+        fitted,
     )
 
 

@@ -10,10 +10,12 @@ from scipy.special import ndtri
 
 from app.charts import Axis, Bars, Chart, Dots, Mark, Note, Panel, Pen, Room, Rule, Series, Share, nothing
 from app.core.spc.capability import Limits
+from app.core.spc.fitting import Fitted, density
 from app.core.spc.refusal import Floats
 from app.core.spc.spread import far_off
 from app.language.i18n import _, ngettext
 from app.language.numbers import signed
+from app.quality.capability import fit_wording
 
 MOST_BARS, FEWEST_BARS = 60, 8
 CURVE = 161  # points of a drawn curve
@@ -23,7 +25,9 @@ SHARES = (0.00135, 0.01, 0.05, 0.25, 0.5, 0.75, 0.95, 0.99, 0.99865)
 
 @dataclass(frozen=True)
 class CapabilityChart:
-    """Values to draw. within: the sigma within, None where it may not be shown; percentiles: 0.135 %, 50 %, 99.865 %."""
+    """Values to draw. within: the sigma within, None where it may not be shown; percentiles: 0.135 %, 50 %, 99.865 %, of the
+    fitted distribution where there is one.
+    """
 
     values: Floats
     limits: Limits
@@ -32,6 +36,7 @@ class CapabilityChart:
     within: float | None
     percentiles: Sequence[float] | None
     normal: bool
+    fitted: Fitted | None = None
 
 
 def histogram(drawn: CapabilityChart) -> Chart:
@@ -55,7 +60,12 @@ def histogram(drawn: CapabilityChart) -> Chart:
             hover=_("%{x:+.2f} µm: %{y} readings"),
         )
     ]
-    if drawn.mean is not None and drawn.normal:
+    if drawn.fitted is not None:
+        at = np.linspace(low, high, 4 * CURVE)
+        height = (len(drawn.values) * width * density(drawn.fitted, at)).tolist()
+        name = fit_wording.name(drawn.fitted.fit.family)
+        marks.append(Series((at * 1000).tolist(), height, Pen("correction", 2), meta="fitted", name=name))
+    elif drawn.mean is not None and drawn.normal:
         at = np.linspace(low, high, CURVE)
         scale = len(drawn.values) * width
         for name, sigma, dash in (
@@ -173,7 +183,7 @@ def _limit_lines(drawn: CapabilityChart, low: float, high: float, *, percentiles
         if limit is not None
     ]
     lines.append(Rule(Pen("quiet", 1, "4px,4px"), x=0.0, words=_("target")))
-    if percentiles and not drawn.normal and drawn.percentiles is not None:
+    if percentiles and drawn.percentiles is not None and (drawn.fitted is not None or not drawn.normal):
         pen = Pen("correction", dash="6px,3px")
         lines += [
             Rule(pen, x=value, words=name, colour="correction", raised=14)

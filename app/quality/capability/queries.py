@@ -28,9 +28,10 @@ from app.core.spc.capability import (
     expected,
     percentile,
 )
+from app.core.spc.fitting import Fitted
 from app.core.spc.in_time import InTime
 from app.core.spc.normality import MOST_FOR_SHAPIRO, Normality
-from app.core.spc.quoting import Quoting, or_refused, quoting, stable
+from app.core.spc.quoting import Quoting, fit_if_needed, or_refused, quoting, stable
 from app.core.spc.refusal import Floats, Refused
 from app.core.spc.spread import far_off
 from app.core.spc.stability import Stability
@@ -75,7 +76,7 @@ class Judgement:
 
     values: deviations, mm, ascending in time. far: readings that lie far from all others (`far_off`), and how far the furthest
     is, mm. baseline: version of the frozen baseline that statistical control was judged by, None where the readings had to
-    judge themselves.
+    judge themselves. by_fit: the distribution that fits, None where the normal one does.
     """
 
     current: CurrentCharacteristic
@@ -93,6 +94,7 @@ class Judgement:
     compensated: bool
     indices: Capability | Refused
     by_percentile: PercentileCapability | Refused
+    by_fit: Fitted | Refused | None
     stability: Stability | Refused
     baseline: int | None
     in_time: InTime | Refused
@@ -132,7 +134,7 @@ class Judgement:
     @cached_property
     def quoting(self) -> Quoting:
         """The index that may be quoted, with its interval; the one decision that pages, reports and cautions follow."""
-        return quoting(self.indices, self.by_percentile, stable=self.stable, far=bool(self.far))
+        return quoting(self.indices, self.by_percentile, stable=self.stable, far=bool(self.far), by_fit=self.by_fit)
 
     @property
     def potential_allowed(self) -> bool:
@@ -140,7 +142,7 @@ class Judgement:
         return self.quote == "cpk"
 
     @property
-    def quote(self) -> Literal["cpk", "ppk", "percentile", "none"]:
+    def quote(self) -> Literal["cpk", "ppk", "fitted", "percentile", "none"]:
         """The index that may be quoted."""
         return self.quoting.quote.value
 
@@ -234,6 +236,7 @@ def _judged(
     limits = Limits(None if side == "upper" else -half, None if side == "lower" else half, 0.0)
     compensated = not current.parameters.measures_only and bool((np.nan_to_num(counted["compensated"]) != 0).any())
     cautions = (Caution.COMPENSATED,) if compensated else ()
+    indices = or_refused(lambda: capability(values, limits, confidence=confidence, cautions=cautions))
     control_verdict, baseline = _stability(session, current, window, counted)
     at, far = counted["measured_at"], far_off(values)
     return {
@@ -250,8 +253,9 @@ def _judged(
         "limits": limits,
         "versions": versions,
         "compensated": compensated,
-        "indices": or_refused(lambda: capability(values, limits, confidence=confidence, cautions=cautions)),
+        "indices": indices,
         "by_percentile": or_refused(lambda: percentile(values, limits, confidence=confidence, minimum=ENOUGH_READINGS)),
+        "by_fit": fit_if_needed(values, limits, indices, confidence=confidence),
         "stability": control_verdict,
         "baseline": baseline,
         "in_time": or_refused(lambda: in_time.in_time(values)),

@@ -6,11 +6,13 @@ from typing import Any, Literal
 from pydantic import BaseModel, Field
 
 from app.core.spc.capability import Fallout, Index, PercentileCapability
+from app.core.spc.distributions import Family
+from app.core.spc.fitting import Fit, Fitted
 from app.core.spc.in_time import InTime
 from app.core.spc.normality import Normality
 from app.core.spc.refusal import Refused
 from app.loop.summaries import wording as statistics
-from app.quality.capability import wording
+from app.quality.capability import fit_wording, wording
 from app.quality.capability.queries import Study
 from app.web.fields import answer_from
 
@@ -22,7 +24,7 @@ class IndexOut(BaseModel):
     low: float | None
     high: float | None
     method: str | None = Field(
-        description="Of the interval: `chi_square`, `bissell`, `noncentral_t`, `boyles`, `order_statistics`."
+        description="Of the interval: `chi_square`, `bissell`, `noncentral_t`, `boyles`, `delta`, `order_statistics`."
     )
 
     @classmethod
@@ -65,7 +67,7 @@ class NormalityOut(BaseModel):
 class QuotedOut(BaseModel):
     """The index that may be quoted, with what it must not be read without."""
 
-    index: Literal["cpk", "ppk", "percentile"]
+    index: Literal["cpk", "ppk", "fitted", "percentile"]
     value: float
     low: float | None = Field(
         description="Of the interval; null by percentiles of fewer than 2731 readings: none bounds them."
@@ -87,6 +89,29 @@ class PercentileOut(BaseModel):
     interval: IndexOut = Field(
         description="Of Ppk, by order statistics; its low end is null below 2731 readings, at 95 %: none bounds the percentile."
     )
+
+
+class FitOut(BaseModel):
+    """A distribution that was fitted, and the test of how well it fits."""
+
+    distribution: Family
+    parameters: dict[str, float] = Field(description="By name; lengths in mm from the target.")
+    statistic: float = Field(description="A² of Anderson and Darling.")
+    p_value: float = Field(description="Of an A² as large by chance, the parameters estimated; 0.01 and more fits.")
+    criterion: float = Field(description="Bayesian information criterion: the smallest that fits is taken.")
+
+
+class FittedOut(FitOut):
+    """Pp and Ppk by the distribution that fits (ISO 22514-2)."""
+
+    low: float = Field(description="X0.135 %")
+    median: float
+    high: float = Field(description="X99.865 %")
+    pp: float | None
+    ppk: IndexOut
+    ppm: FalloutOut = Field(description="Expected of this distribution.")
+    why: str = Field(description="Why this one.")
+    tried: list[FitOut] = Field(description="Every distribution that was tried, the best criterion first.")
 
 
 class TestOut(BaseModel):
@@ -166,7 +191,7 @@ class CapabilityOut(BaseModel):
     mean: float | None
     sigma_within: float | None = Field(description="Mean moving range / d2.")
     sigma_overall: float | None
-    quote: Literal["cpk", "ppk", "percentile", "none"] = Field(description="Which number may be quoted.")
+    quote: Literal["cpk", "ppk", "fitted", "percentile", "none"] = Field(description="Which number may be quoted.")
     quoted: "QuotedOut | None" = Field(
         description="That number with its window and method; null where `quote` is none."
     )
@@ -176,6 +201,9 @@ class CapabilityOut(BaseModel):
     pp: IndexOut | None
     ppk: IndexOut | None
     cpm: IndexOut | None
+    fitted: FittedOut | None = Field(
+        description="Where the readings are not normal, or a natural limit has a distribution that fits better; of 100 readings and more."
+    )
     percentiles: PercentileOut | None = Field(description="Of 100 readings and more.")
     ppm_within: FalloutOut | None = Field(description="Expected under a normal distribution with sigma within.")
     ppm_overall: FalloutOut | None = Field(description="The same with the sigma of all readings.")
@@ -234,6 +262,7 @@ def capability_out(study: Study) -> CapabilityOut:
         pp=IndexOut.of(result.pp if result else None),
         ppk=IndexOut.of(result.ppk if result else None),
         cpm=IndexOut.of(result.cpm if result else None),
+        fitted=_fitted(study.by_fit) if isinstance(study.by_fit, Fitted) else None,
         percentiles=_percentiles(by_percentile) if by_percentile else None,
         ppm_within=FalloutOut.of(study.within),
         ppm_overall=FalloutOut.of(study.overall),
@@ -256,6 +285,24 @@ def capability_out(study: Study) -> CapabilityOut:
 
 def _fields(given: Any) -> dict[str, Any]:
     return {name: getattr(given, name) for name in given.__slots__}
+
+
+def _fit(fit: Fit) -> dict[str, Any]:
+    return {"distribution": fit.family, "parameters": fit.named} | {
+        name: getattr(fit, name) for name in ("statistic", "p_value", "criterion")
+    }
+
+
+def _fitted(found: Fitted) -> FittedOut:
+    return answer_from(
+        FittedOut,
+        found,
+        **_fit(found.fit),
+        ppk=IndexOut.of(found.ppk),
+        ppm=FalloutOut.of(found.ppm),
+        why=fit_wording.reason(found),
+        tried=[FitOut(**_fit(fit)) for fit in found.tried],
+    )
 
 
 def _percentiles(found: PercentileCapability) -> PercentileOut:

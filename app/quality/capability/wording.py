@@ -1,6 +1,7 @@
 """The words of capability: verdicts, tests, models in time, and which index may be quoted."""
 
 from app.core.spc.capability import Caution, Index
+from app.core.spc.fitting import Fitted
 from app.core.spc.in_time import ALPHA, InTime, Location, Model, Test
 from app.core.spc.normality import Normality
 from app.core.spc.quoting import Quoting, WhyNot
@@ -9,6 +10,7 @@ from app.core.spc.stability import Fired, Stability
 from app.language.i18n import _, ngettext
 from app.language.numbers import fixed, signed
 from app.loop.summaries import wording as statistics
+from app.quality.capability import fit_wording as fits
 from app.quality.capability.queries import Study
 
 CAPABLE, VERY_CAPABLE = 4 / 3, 5 / 3
@@ -31,7 +33,7 @@ def verdict(value: float | None) -> tuple[str, str]:
 
 def index_name(quote: str) -> str:
     """The name of the index that may be quoted."""
-    return {"cpk": "Cpk", "percentile": _("Ppk by percentiles")}.get(quote, "Ppk")
+    return {"cpk": "Cpk", "fitted": _("Ppk by fit"), "percentile": _("Ppk by percentiles")}.get(quote, "Ppk")
 
 
 def method(quote: str) -> str:
@@ -39,6 +41,7 @@ def method(quote: str) -> str:
     return {
         "cpk": _("normal distribution, scatter from part to part"),
         "ppk": _("normal distribution, spread of all readings"),
+        "fitted": _("fitted distribution (ISO 22514-2)"),
         "percentile": _("percentiles (ISO 22514-2)"),
         "none": "",
     }[quote]
@@ -48,7 +51,7 @@ def why_not(code: str | None) -> str:
     """The reason why no index may be quoted, in a few words."""
     return {
         WhyNot.FAR_OFF.value: _("a reading lies far from all others"),
-        WhyNot.NO_SHAPE.value: _("not normal, and no percentiles"),
+        WhyNot.NO_SHAPE.value: _("not normal, and no distribution fits"),
         "not_yet": _("not computed yet; ready in a few minutes"),
         Reason.TOO_FEW_READINGS.value: _("too few readings"),
         Reason.NO_VARIATION.value: _("all readings are the same"),
@@ -217,7 +220,7 @@ def model_means(study: Study) -> str:
     if study.quote == "none":
         return _("Do not report an index: {why}.").format(why=why_not(study.quoting.why))
     which = study.in_time.model
-    index = _("Ppk by percentiles") if study.quote == "percentile" else _("Pp and Ppk")
+    index = index_name(study.quote) if study.quote in {"fitted", "percentile"} else _("Pp and Ppk")
     if which.steady and study.stable is not True:
         why = (
             _("the process is not in control (run rules)")
@@ -345,6 +348,8 @@ def cautions(study: Study) -> list[str]:
 
 def _not_normal(study: Study) -> str:
     """Warn that no normal distribution carries the numbers, and name the method that does, if any."""
+    if isinstance(study.by_fit, Fitted):
+        return fits.caution(study.by_fit)
     if not isinstance(study.by_percentile, Refused):
         return statistics.caution(Caution.NOT_NORMAL)
     if study.by_percentile.reason is Reason.TOO_FEW_READINGS:

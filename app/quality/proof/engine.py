@@ -19,6 +19,8 @@ from app.core.spc.capability import (
     spread_index,
     target_index,
 )
+from app.core.spc.distributions import Family, quantiles
+from app.core.spc.fitting import fit_of_family, p_of_anderson_darling
 from app.core.spc.in_time import brown_forsythe, decompose, successive
 from app.core.spc.normality import anderson_darling, p_of, shapiro_wilk
 from app.core.spc.rules import RULES, Rule, RuleName, signals, signals_of_cusum
@@ -235,6 +237,20 @@ def by_percentile(given: Given) -> Got:
     return {"low": result.low, "median": result.median, "high": result.high, "pp": result.pp, "ppk": result.ppk.value}
 
 
+def distribution(given: Given) -> Got:
+    """Parameters, A^2 and p of a distribution fitted to readings; percentiles where they are asked for."""
+    family = Family(given["family"])
+    fit = fit_of_family(family, np.sort(readings_of(given)))
+    three = quantiles(family, np.array([fit.parameters]), np.array(given.get("shares", [0.5])))[0]
+    return fit.named | {"statistic": fit.statistic, "p_value": fit.p_value, "quantiles": three.tolist()}
+
+
+def critical_values(given: Given) -> Got:
+    """Probabilities of the critical values of A^2 of a distribution whose parameters are estimated."""
+    row = np.array([given["parameters"]])
+    return {"p_values": [p_of_anderson_darling(a, Family(given["family"]), row) for a in given["statistics"]]}
+
+
 def places(given: Given) -> Got:
     """Ordered readings, counted from 1, that bound a quantile; 0 where none does."""
     found = [order_statistics(given["share"], n, given["confidence"]) for n in given["readings"]]
@@ -304,6 +320,8 @@ ENGINE: dict[str, Callable[[Given], Got]] = {
     "one_sided_bounds": one_sided_bounds,
     "percentile": by_percentile,
     "order_statistics": places,
+    "distribution": distribution,
+    "goodness_of_fit": critical_values,
     "percentile_indices": indices_of_percentiles,
     "anderson_darling": anderson,
     "anderson_p": anderson_p,

@@ -41,6 +41,8 @@ def topics() -> dict[str, tuple[str, tuple[str, ...]]]:
                 "percentile",
                 "percentile_indices",
                 "order_statistics",
+                "distribution",
+                "goodness_of_fit",
                 "anderson_darling",
                 "anderson_p",
                 "shapiro_wilk",

@@ -126,7 +126,7 @@ class FiguresOut(BaseModel):
     )
     largest: float | None = Field(description="Largest deviation, without its sign.")
     alarms: int = Field(description="Readings that raise an alarm by their size.")
-    quote: Literal["cpk", "ppk", "percentile", "none"] | None = Field(
+    quote: Literal["cpk", "ppk", "fitted", "percentile", "none"] | None = Field(
         None, description="The index that may be quoted, as on the page of capability; null in the cells of a map."
     )
     quoted: float | None = Field(None, description="Its value.")

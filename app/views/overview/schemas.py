@@ -28,9 +28,11 @@ class RankedOut(BaseModel):
     state: str
     reasons: list[AttentionReasonOut] = Field(description="The most urgent first; empty where nobody is needed.")
     ppk: float | None = Field(
-        description="The index that may be quoted of the last 1000 readings, as on the page of capability; `quote` says which one: Cpk, Ppk, or Ppk by percentiles. null where none may."
+        description="The index that may be quoted of the last 1000 readings, as on the page of capability; `quote` says which one: Cpk, Ppk, Ppk by a fitted distribution, or Ppk by percentiles. null where none may."
     )
-    quote: Literal["cpk", "ppk", "percentile", "none"] = Field(description="Which index it is, and by which method.")
+    quote: Literal["cpk", "ppk", "fitted", "percentile", "none"] = Field(
+        description="Which index it is, and by which method."
+    )
     low: float | None = Field(description="Its 95 % interval; null where it has none.")
     high: float | None = Field(description="Its 95 % interval; null where it has none.")
     preliminary: bool = Field(description="Of too few readings to stand without its interval.")

@@ -178,16 +178,43 @@ def test_the_model_in_time_and_which_number_it_allows(shop: Shop) -> None:
     rng = Random(2)
     shop.push([round(rng.choice((-1, 1)) * rng.expovariate(1 / 0.6), 3) for _ in range(250)], tails)
     found = of(shop, characteristic=tails)
-    assert (found["in_time"]["model"], found["stable"], found["quote"]) == ("A2", False, "percentile")
+    assert (found["in_time"]["model"], found["stable"], found["quote"]) == ("A2", False, "fitted")
     # Two questions, two names: the run rules speak against it, the model in time does not; the caution says which.
     assert (found["in_control"], found["constant_in_time"]) == (False, True)
     assert found["stability"].startswith("Not in control")
     assert "the process is not in control (run rules). Ppk" in found["cautions"][0]
-    assert "report Ppk by percentiles, not Cp and Cpk" in found["in_time"]["means"]
+    assert "report Ppk by fit, not Cp and Cpk" in found["in_time"]["means"]
     page = shop.admin.get(f"/characteristics/{tails}/capability?last=all").text
     assert found["in_time"]["means"] in page
     report = shop.admin.get(f"/characteristics/{tails}/report?section=capability&last=all").text
     assert found["in_time"]["means"] in report
+
+
+def test_readings_of_two_states_are_quoted_by_the_distribution_that_fits(shop: Shop) -> None:
+    key = shop.another("two-states", mode="measure_only", tool_memory=0, wear_limit=0.9)
+    rng = Random(12)
+    shop.push([round(rng.gauss(0, 3.0 if rng.random() < 0.2 else 0.9), 2) for _ in range(400)], key)
+    found = of(shop, characteristic=key)
+    fit = found["fitted"]
+    assert (found["quote"], fit["distribution"]) == ("fitted", "two_normals")
+    assert fit["p_value"] >= 0.01
+    assert fit["parameters"].keys() == {"share", "first_mean", "second_mean", "first_sigma", "second_sigma"}
+    assert found["quoted"]["value"] == fit["ppk"]["value"]
+    assert 0.3 < fit["ppk"]["low"] < fit["ppk"]["value"] < fit["ppk"]["high"] < 2
+    assert fit["ppm"]["total"] > found["ppm_overall"]["total"], "the tails that a normal distribution does not have"
+    assert len(fit["tried"]) == 1
+    assert any("two normal distributions" in each for each in found["cautions"])
+    facts = {
+        fact["key"]: fact
+        for fact in shop.call("GET", f"/characteristics/{key}/report.json?section=capability")["sections"][0]["facts"]
+    }
+    assert facts["ppk_fitted"]["value"] == pytest.approx(fit["ppk"]["value"])
+    assert facts["distribution"]["value"] == "two normal distributions"
+    page = shop.admin.get(f"/characteristics/{key}/capability").text
+    assert "Which distribution?" in page
+    assert fit["why"] in page
+    drawn = shop.call("GET", f"/characteristics/{key}/figures/capability?last=all")["data"]
+    assert [each["name"] for each in drawn if each.get("meta") == "fitted"] == ["two normal distributions"]
 
 
 def test_which_readings(shop: Shop) -> None:

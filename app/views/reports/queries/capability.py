@@ -1,10 +1,12 @@
 """Capability as its page judges it: indices with intervals, what may be quoted, or why there is no number."""
 
 from app.core.spc.capability import Index
+from app.core.spc.fitting import Fitted
 from app.core.spc.refusal import Refused
 from app.files.documents.content import Fact, Section, count, deviation, number, probability, width, words
 from app.language.i18n import _
 from app.loop.summaries import wording as statistics
+from app.quality.capability import fit_wording as fits
 from app.quality.capability import queries as capabilities
 from app.quality.capability import wording
 from app.quality.capability.queries import Study
@@ -59,6 +61,14 @@ def _indices(study: Study) -> list[Fact]:
     facts = [
         _index(key, name, index, quotable=quotable.get(key, True)) for key, name, index in named if index is not None
     ]
+    if isinstance(study.by_fit, Fitted):
+        fit = study.by_fit.fit
+        facts += [
+            _index("ppk_fitted", _("Ppk by fit"), study.by_fit.ppk, quotable=study.quote == "fitted"),
+            Fact("distribution", _("Fitted distribution"), words(fits.name(fit.family)), note=fits.parameters(fit)),
+            Fact("distribution_fit", _("Anderson-Darling A² of the fit"), number(fit.statistic, 3)),
+            Fact("distribution_fit_p", _("p of the fit"), probability(fit.p_value)),
+        ]
     by_percentile = study.by_percentile
     if not isinstance(by_percentile, Refused):
         index, name = by_percentile.ppk, _("Ppk by percentiles")
@@ -84,7 +94,18 @@ def _spread(study: Study) -> list[Fact]:
     for key, name, fallout, holds in (
         ("ppm_observed", _("Counted, ppm"), study.fallout, True),
         ("ppm_within", _("Expected by sigma within, ppm"), study.within, study.quote == "cpk"),
-        ("ppm_overall", _("Expected by sigma overall, ppm"), study.overall, study.normal),
+        (
+            "ppm_overall",
+            _("Expected by sigma overall, ppm"),
+            study.overall,
+            study.quote not in {"fitted", "percentile"} and study.normal,
+        ),
+        (
+            "ppm_fitted",
+            _("Expected by the fitted distribution, ppm"),
+            study.by_fit.ppm if isinstance(study.by_fit, Fitted) else None,
+            True,
+        ),
     ):
         if fallout is not None:
             note = "" if holds else _("do not report")
