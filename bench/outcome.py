@@ -26,10 +26,10 @@ from app.bridge import control_side, offering, server_side
 from app.bridge.configuration import configuration_from
 from app.bridge.program import link_of
 from app.bridge.simulators import simulator_named
-from app.bridge.simulators.model import OWNERS, UNMAPPED, Feature, Model, six_tools
+from app.bridge.simulators.model import OWNERS, UNMAPPED, Feature, Model, Steps, six_tools
 from app.bridge.store import Store
 from app.bridge.unit import Unit, ended
-from app.core.ring import SLOTS, Register
+from app.core.ring import SLOTS, Register, Status
 from bench.plant import PARAMETERS, TARGET, plant
 from inband_client import AsyncClient
 
@@ -59,13 +59,16 @@ def features_of(kind: str) -> tuple[Feature, ...]:
 class Process(Model):
     """A machine whose parts have the same wear and scatter whatever corrects it. sizes: deviations of each characteristic, mm.
 
-    amiss: as sure as factor and sign may be wrong at the control, what a correction does there; 1: what it says.
+    amiss: as sure as factor, sign and unit may be wrong at the control, what a correction does there; 1: what it says. swapped: tools
+    whose offsets it takes for each other's. blind: the first part of which the probe does not see the first characteristic, 0: none.
     """
 
     sizes: dict[int, list[float]] = field(default_factory=dict)
     new_at: dict[int, int] = field(default_factory=dict)
     broken: bool = False
     amiss: float = 1.0
+    swapped: dict[int, int] = field(default_factory=dict)
+    blind: int = 0
 
     def size(self, feature: Feature) -> float:
         """The size that is cut and measured now."""
@@ -73,9 +76,18 @@ class Process(Model):
         worn = feature.wear * (self.parts - self.new_at.get(feature.tool, 0))
         if self.broken and feature.tool == BROKEN:
             worn += BREAK
-        deviation = worn + scatter + self.amiss * self.offsets[feature.tool, feature.edge, feature.register]
+        deviation = worn + scatter + self.amiss * self.offsets[self.place_of(self.swapped.get(feature.tool, feature.tool))]
         self.sizes.setdefault(feature.number, []).append(deviation)
         return feature.nominal + deviation
+
+    def place_of(self, tool: int) -> tuple[int, int, str]:
+        """The offset of a tool."""
+        return next((each.tool, each.edge, each.register) for each in self.features if each.tool == tool)
+
+    def send(self, characteristic: int, measured: float, tool: int, status: int = Status.GOOD) -> Steps:
+        """Write the reading of a probe that may have failed."""
+        failed = characteristic == 1 and 0 < self.blind <= self.parts
+        yield from Model.send(self, characteristic, measured, tool, Status.NO_TRIGGER if failed else status)
 
     def renew(self, tool: int) -> None:
         """Another edge, and its offset set to 0."""
@@ -168,12 +180,13 @@ class Play:
             process.parts += 1
             for feature in process.features:
                 size = process.size(feature)
+                failed = feature.number == 1 and 0 < process.blind <= part
                 self.call(
                     "POST",
                     "/readings",
                     characteristic=self.keys[feature.number],
-                    measured=round(size, 6),
                     correction_in_effect=in_effect.get(feature.tool, 0),
+                    **({"touches": []} if failed else {"measured": round(size, 6)}),
                 )
                 if wait == 0:
                     self._apply(feature.tool, in_effect)
@@ -187,7 +200,7 @@ class Play:
     def _apply(self, tool: int, in_effect: dict[int, int]) -> None:
         if tool == UNMAPPED:
             return
-        [place] = {(each.tool, each.edge, each.register) for each in self.process.features if each.tool == tool}
+        place = self.process.place_of(tool)
         for each in self.call("GET", f"/machines/{self.machine}/corrections?status=pending&limit=1000")["items"]:
             if each["tool_memory"] == tool:
                 self.process.offsets[place] = each["offset_expected"]

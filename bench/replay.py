@@ -21,7 +21,7 @@ from app.core.decision import loops
 from app.core.decision.decide import LoopState, decide
 from app.core.decision.limits import ZONES
 from app.core.decision.loops import LANE, TALLY, Mark, ProcessTrace, ReplayResult
-from app.core.decision.step import CODES, Action, effect_of, rounded
+from app.core.decision.step import CODES, Action, effect_of, not_in_size, rounded
 from app.core.parameters import Parameters
 from app.core.policy_map import with_settings
 from app.core.replay import Policy, ReplayedCharacteristic, figures_of, run, without_events
@@ -82,8 +82,8 @@ def followed(trace: ProcessTrace, policy: Policy) -> Iterator[tuple[float, float
         decision = decide(
             parameters,
             LoopState(averages[lane.memory] if lane.memory >= 0 else 0.0, total, bool(mark & Mark.PAUSED)),
-            rounded(free + lane.response * offset),
-            outstanding=effect_of(pending, parameters.factor),
+            rounded(free + lane.of_size * offset),
+            outstanding=effect_of(not_in_size(parameters.rules, total, pending), parameters.factor),
             accepted=not mark & Mark.REJECTED,
             jump=bool(mark & Mark.JUMP),
         )

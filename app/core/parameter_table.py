@@ -52,7 +52,8 @@ MOST_LOCATIONS = 999
 class Feature(StrEnum):
     """The probed feature: a part from outside (shaft, spigot, web) or inside (bore, slot, pocket), or the tool R10 itself.
 
-    The length or radius of a tool tells its wear directly: no correction of an offset changes it.
+    The length or radius of a tool tells its wear directly: no correction of an offset changes it, and all of them together
+    are to be what it differs by.
     """
 
     OUTSIDE = "outside"
@@ -160,9 +161,9 @@ class Problem(NamedTuple):
     """Something wrong with a parameter set: where, what (a code with values), and how bad.
 
     Codes: required, unknown, twice, not_a_number, not_whole, not_a_choice, not_yes_no, range, order, target_missing,
-    target_twice, tolerance_sign, sign_missing, factor_zero, accept, sections, tool_measured, no_location, and the warnings source_range,
+    target_twice, tolerance_sign, sign_missing, factor_zero, accept, sections, tool_measured, contested, no_location, and the warnings source_range,
     variant_axis, points_missing, not_on_lathe, factor_on_lathe, switch_value, switch_wins, switch_loses,
-    out_of_reach, spacing_missing, places_coincide, limits_as_sizes, averages_never.
+    out_of_reach, spacing_missing, places_coincide, limits_as_sizes, averages_never, factor_of_tool.
     """
 
     field: str

@@ -124,6 +124,7 @@ class Parameters:
             measures_only=self.measures_only,
             holds_wear=self.wear_policy is WearPolicy.HOLD,
             rejected_may_correct=self.rejected_may_correct,
+            of_tool=self.feature is Feature.TOOL and not self.measures_only,
         )
 
     @property
@@ -362,13 +363,9 @@ def _order(values: Mapping[str, Any]) -> Iterator[Problem]:
 
 
 def _tool_measured(values: Mapping[str, Any]) -> Iterator[Problem]:
-    """A tool that is measured itself belongs to a location, and nothing is corrected by its own size."""
-    if values["feature"] != Feature.TOOL:
-        return
-    if values["tool_memory"] == 0:
+    """A tool that is measured itself belongs to a location."""
+    if values["feature"] == Feature.TOOL and values["tool_memory"] == 0:
         yield Problem("tool_memory", "tool_measured", {})
-    if values["mode"] != Mode.MEASURE_ONLY:
-        yield Problem("mode", "tool_measured", {})
 
 
 def unusual_partly(given: Mapping[str, Any]) -> list[Problem]:

@@ -38,7 +38,7 @@ from app.core.decision.loops import (
     follow_each,
 )
 from app.core.decision.step import DECIMALS
-from app.core.parameters import Parameters
+from app.core.parameters import Feature, Parameters
 
 LONGEST_DELAY = 200  # parts
 FEWEST_FOR_PPK = 20
@@ -56,10 +56,15 @@ class ReplayedCharacteristic(NamedTuple):
     memory: int = 0
     counts: bool = True
 
+    @property
+    def of_size(self) -> float:
+        """The response of what is measured: that of a tool itself is what it is."""
+        return 0.0 if self.parameters.feature is Feature.TOOL else self.response
+
     def row(self) -> tuple[Any, ...]:
         """Return it as a row of `LANE`."""
         rules = self.parameters.rules
-        return (*rules, self.response, self.memory if rules.averages else -1, self.counts)
+        return (*rules, self.of_size, self.memory if rules.averages else -1, self.counts)
 
 
 class Policy(NamedTuple):

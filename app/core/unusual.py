@@ -4,7 +4,7 @@ from collections.abc import Iterator, Mapping
 from typing import Any
 
 from app.core.decision.limits import nanometres
-from app.core.parameter_table import FIELDS, Axis, MachineType, Mode, Problem, Variant
+from app.core.parameter_table import FIELDS, Axis, Feature, MachineType, Mode, Problem, Variant
 
 INDEX_ANGLES = (0.0, 359.5)  # degrees, R26 of the variants that index the part
 CALIBRATION_RANGES = {"path_factor": (1, 10)}  # where L92 has another range than L93
@@ -29,6 +29,7 @@ def unusual(values: Mapping[str, Any]) -> Iterator[Problem]:
     yield from _places(values)
     yield from _limits_as_sizes(values)
     yield from _averages_never(values)
+    yield from _factor_of_tool(values)
     window, confidence = values["path_factor"], values.get("confidence_limit")
     if confidence is not None and nanometres(confidence) > nanometres(window):
         data = {"value": confidence, "window": window}
@@ -72,6 +73,13 @@ def _averages_never(values: Mapping[str, Any]) -> Iterator[Problem]:
         yield Problem("average_memory", "averages_never", data, warning=True)
 
 
+def _factor_of_tool(values: Mapping[str, Any]) -> Iterator[Problem]:
+    """Warn of a factor below 0 with which the offset of a tool that is longer, or larger, becomes smaller."""
+    factor = values.get("factor")
+    if values["feature"] == Feature.TOOL and values["mode"] != Mode.MEASURE_ONLY and factor is not None and factor < 0:
+        yield Problem("factor", "factor_of_tool", {"value": factor}, warning=True)
+
+
 def _outside(name: str, value: float, usual: tuple[float, float]) -> Iterator[Problem]:
     low, high = usual
     if not low <= value <= high:
@@ -106,6 +114,7 @@ def unusual_on(values: Mapping[str, Any], machine: MachineType) -> list[Problem]
         problems.append(Problem("variant", "not_on_lathe", {}, warning=True))
     factor = values.get("factor")
     corrects = values.get("tool_memory") and values.get("mode") != Mode.MEASURE_ONLY
+    corrects = corrects and values.get("feature") != Feature.TOOL
     if isinstance(factor, int | float) and factor > 0 and corrects:
         problems.append(Problem("factor", "factor_on_lathe", {"value": factor}, warning=True))
     return problems

@@ -10,7 +10,7 @@ from hypothesis import given
 from app.core.decision.limits import ZONES
 from app.core.decision.loops import Mark, ProcessTrace, ReplayResult, _rounded
 from app.core.decision.step import CODES, Code
-from app.core.parameters import Mode, Parameters, WearPolicy
+from app.core.parameters import Feature, Mode, Parameters, WearPolicy
 from app.core.replay import (
     Policy,
     ReplayedCharacteristic,
@@ -60,6 +60,7 @@ def parameter_sets(draw: st.DrawFn) -> Parameters:
         mode=draw(st.sampled_from([Mode.AUTOMATIC, Mode.AUTOMATIC, Mode.MEASURE_ONLY])),
         wear_policy=draw(st.sampled_from(list(WearPolicy))),
         rejected_may_correct=draw(st.booleans()),
+        feature=draw(st.sampled_from([Feature.OUTSIDE, Feature.OUTSIDE, Feature.TOOL])),
         max_step=draw(st.one_of(st.none(), LENGTHS)),
         max_total=draw(st.one_of(st.none(), LENGTHS)),
     )

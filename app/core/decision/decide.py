@@ -18,6 +18,10 @@ offset. `decide` therefore judges the deviation that the part would have had wit
 issued so far (`outstanding`); the raw deviation is what is stored and charted. Two things are facts
 about the part itself and are told by the raw deviation whatever has been corrected since: that it is
 out of tolerance, and that the probe cannot be believed (R36).
+
+**A tool that is measured itself** shows no correction: its size is what it is. It is judged with all corrections since it was
+changed counted in (`not_in_size`), so that their sum settles at factor x D however often it is measured, and whatever the machine
+confirms. Worn (R37) it is by its raw deviation, corrected or not; out of tolerance by what is not corrected yet.
 """
 
 from collections.abc import Iterable
@@ -72,7 +76,7 @@ class Decision(NamedTuple):
     decided: D with the outstanding corrections taken into account; zone and action follow from it.
     size_error: the error that `amount` removes (D or M), None without a correction.
     clamped: `max_step` made the amount smaller.
-    good: the part itself lies within its tolerance.
+    good: the part itself lies within its tolerance; of a tool, what is not corrected does.
     """
 
     deviation: float
@@ -104,6 +108,7 @@ def decide(
     accepted: bool = True,
     jump: bool = False,
     fault: Code | None = None,
+    by_hand: bool = False,
 ) -> Decision:
     """Decide one reading (domain §3).
 
@@ -116,6 +121,8 @@ def decide(
         nothing unless the characteristic allows it.
     jump: neither wear nor scatter explains it (`plausibility.is_jump`): what it asks for is computed in full and held, and
         it says nothing to the average. In the wear zone the alarm *tool worn* asks the same already.
+    by_hand: the size is that of the tool itself, and somebody has set its offset since it was changed: nobody knows how much
+        of it that offset has in it already, so nothing is corrected until the tool is changed.
     fault: why the reading cannot be believed whatever D is: the probe triggered on its way to the surface (domain §5, *not a
         bore*), or a touch is missing or outside its window (domain §4). A probe fault.
 
@@ -135,8 +142,11 @@ def decide(
         not accepted,
         jump,
         BELIEVED if fault is None else CODES.index(fault),
+        by_hand,
     )
-    good = within_tolerance(deviation, parameters.limits) and fault is None
+    good = (
+        within_tolerance(made.decided if parameters.rules.of_tool else deviation, parameters.limits) and fault is None
+    )
     alarms = []
     if made.zone == FAULT:
         alarms.append(ReadingAlarm.PROBE_FAULT)

@@ -27,6 +27,7 @@ from app.core.decision.step import (
     Rules,
     deviation_of,
     effect_of,
+    not_in_size,
     rounded,
     step,
 )
@@ -303,7 +304,7 @@ def follow(trace: ProcessTrace, lanes: Rows, delay: int, result: ReplayResult, t
             float(averages[memory]) if memory >= 0 else 0.0,  # uncompiled, NumPy's own floats round otherwise
             total,
             deviation,
-            effect_of(pending, lane.factor),
+            effect_of(not_in_size(lane, total, pending), lane.factor),
             mark & Mark.PAUSED != 0,
             False,
             mark & Mark.REJECTED != 0,

@@ -48,19 +48,22 @@ class Code(StrEnum):
     IMPORTED = "imported"
     FIRST_MOVE_TRIGGERED = "first_move_triggered"
     TOUCH_FAULT = "touch_fault"
+    OFFSET_BY_HAND = "offset_by_hand"
 
 
 CODES = tuple(Code)
 WITHIN_ZERO_RANGE, AVERAGE_KEPT, AVERAGED_DEVIATION, FULL_DEVIATION, OUT_OF_TOLERANCE = range(5)
 TOOL_WORN_HELD, TOOL_WORN_RELEASED, PROBE_FAULT, PAUSED, MEASURE_ONLY = range(5, 10)
 BEFORE_TOOL_CHANGE, OFFSET_LIMIT, REJECTED, IMPLAUSIBLE, IMPORTED, FIRST_MOVE_TRIGGERED, TOUCH_FAULT = range(10, 17)
+OFFSET_BY_HAND = 17
 BELIEVED = -1
 
 
 class Rules(NamedTuple):
     """The parameters that a step goes by: limits in nm as in `Limits`, lengths in mm, infinity for a bound that is not set.
 
-    averages: there is a memory for the running average (R11). Loops hand over a row of an array with these fields.
+    averages: there is a memory for the running average (R11). of_tool: the size is that of the tool itself, which no correction
+    changes, and corrects its offset. Loops hand over a row of an array with these fields.
     """
 
     zero_range: int  # R33
@@ -76,6 +79,7 @@ class Rules(NamedTuple):
     measures_only: bool
     holds_wear: bool
     rejected_may_correct: bool
+    of_tool: bool = False
 
 
 class Step(NamedTuple):
@@ -134,6 +138,15 @@ def effect_of(amount: float, factor: float) -> float:
     return rounded(-amount / factor) if amount else 0.0
 
 
+def not_in_size(rules: Rules, total: float, pending: float) -> float:
+    """Return the sum of corrections that a measured size does not show, mm of offset.
+
+    total: of all since the tool was changed, those that are pending included. Of a part it is what took effect too late for it.
+    The size of the tool itself shows none, ever: each correction would be made again with every reading.
+    """
+    return total if rules.of_tool else pending
+
+
 def exceeds(total: float, amount: float, limit: float) -> bool:
     """Return whether a correction takes the sum beyond its limit. One that leads back towards zero never does."""
     if limit == inf:
@@ -160,6 +173,7 @@ def step(
     rejected: bool,
     jump: bool,
     fault: int,
+    by_hand: bool = False,
 ) -> Step:
     """Decide one reading as `decide` explains. average: M before it; total: sum of the corrections of the tool.
 
@@ -168,6 +182,8 @@ def step(
     before = average if rules.averages else 0.0
     decided = rounded(deviation + outstanding) if outstanding else deviation
     zone = zone_of(decided, rules)
+    if rules.of_tool and zone < WEAR and reaches(nanometres(deviation), rules.wear):
+        zone = WEAR  # corrected or not, the tool is as worn as it is
     if fault != BELIEVED or reaches(nanometres(deviation), rules.confidence):
         zone = FAULT
     if zone == FAULT:
@@ -181,7 +197,7 @@ def step(
 
     # A correction that is held in the wear zone asks the same already.
     jumped = jump and not (zone == WEAR and rules.holds_wear)
-    if jumped and (zone == ZERO or rules.measures_only):
+    if jumped and (zone == ZERO or rules.measures_only or by_hand):
         return without_correction(decided, zone, IMPLAUSIBLE, before, jumped=True)
 
     # What the zone asks for: the error to remove, what M becomes with and without a correction.
@@ -189,8 +205,11 @@ def step(
     kept = updated if rules.averages else 0.0
     if zone == ZERO:
         return without_correction(decided, zone, WITHIN_ZERO_RANGE, kept)
-    if rules.measures_only:
-        return without_correction(decided, zone, MEASURE_ONLY, before if zone == WEAR else kept)
+    if rules.measures_only or by_hand:
+        code = OFFSET_BY_HAND if by_hand else MEASURE_ONLY
+        return without_correction(decided, zone, code, before if zone == WEAR else kept)
+    if rules.of_tool and within(nanometres(decided), rules.zero_range):
+        return without_correction(decided, zone, WITHIN_ZERO_RANGE, before)  # worn out, and corrected for
     action, size_error, after, without = CORRECT, decided, 0.0, before
     if jumped:
         action, code, after = HOLD, IMPLAUSIBLE, before

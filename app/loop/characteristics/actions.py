@@ -12,8 +12,10 @@ from app.core.fits import with_fit
 from app.core.parameters import (
     BY_R,
     TWO_POINT_SWITCH,
+    Feature,
     ParameterError,
     Parameters,
+    Problem,
     Variant,
     default_averaging_limit,
     read,
@@ -63,6 +65,8 @@ def add_characteristic(session: Session, given: CharacteristicIn, actor: str) ->
             errors=[FieldError("key", _("is taken"))],
         )
     parameters = _read(given.parameters, machine)
+    if errors := contested(session, machine, given.key, parameters):
+        raise _refused(errors)
     new = Characteristic(machine_id=machine.id, key=given.key, name=given.name, part=given.part, unit=given.unit)
     session.add(new)
     session.flush()
@@ -157,6 +161,25 @@ def refusals(given: Mapping[str, Any], machine: Machine | None = None) -> list[F
     return wording.field_errors(problems)
 
 
+def contested(session: Session, machine: Machine, key: str, parameters: Parameters) -> list[FieldError]:
+    """The error of a tool whose offset parts and its own size would correct, by turns: each would undo what the other did.
+
+    The size of a tool is compared with the sum of all its corrections, so that of another characteristic would be taken back.
+    """
+    if parameters.measures_only:
+        return []
+    for other in queries.correcting(session, machine.id, parameters.tool_memory):
+        if other.characteristic.key != key and Feature.TOOL in {parameters.feature, other.parameters.feature}:
+            return wording.field_errors(
+                [
+                    Problem(
+                        "tool_memory", "contested", {"tool": parameters.tool_memory, "other": other.characteristic.key}
+                    )
+                ]
+            )
+    return []
+
+
 def _read(given: Mapping[str, Any], machine: Machine) -> Parameters:
     """Raises `Invalid` with everything that is wrong at once."""
     errors = refusals(given, machine)
@@ -209,6 +232,8 @@ def _change_parameters(
     old, new = current.parameters, None if errors else read(changed)[0]
     if new == old:
         return current, []
+    if new is not None:
+        errors += contested(session, machine, characteristic.key, new)
     if not reason:
         wrong = _("is required when parameters change: say why, for those who read it in a year")
         errors.append(FieldError("reason", wrong))

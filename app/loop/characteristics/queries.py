@@ -81,6 +81,13 @@ def characteristic_for(session: Session, caller: Caller, key: str, role: Role) -
     return current
 
 
+def correcting(session: Session, machine_id: int, tool_memory: int) -> list[CurrentCharacteristic]:
+    """The characteristics that correct the offset of this tool, by key."""
+    on_it = _CURRENT.where(Stream.machine_id == machine_id, Stream.tool_memory == tool_memory)
+    rows = session.execute(on_it.order_by(Characteristic.key))
+    return [each for row in rows if not (each := CurrentCharacteristic(*row)).parameters.measures_only]
+
+
 def mapped(session: Session, machine: Machine) -> Sequence[Mapping[str, Any]] | None:
     """Return the tool locations to which the bridge of a machine may write; None without a bridge."""
     return session.scalar(select(Connection.locations).where(Connection.machine_id == machine.id))

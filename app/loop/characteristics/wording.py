@@ -62,7 +62,7 @@ def explanation(name: str) -> str | None:
         ),
         "feature": _(
             "The part from outside or inside (with the direction it says where the probe starts), or the tool itself: its length "
-            "or radius tells its wear."
+            "or radius tells its wear and, unless it is only measured, corrects its offset."
         ),
         "nominal": _("As on the drawing. With a tolerance class, 40 h6 (ISO 286), the deviations follow from it."),
         "target": _("Aimed at: the middle of the tolerance."),
@@ -242,9 +242,17 @@ def sentence(problem: Problem) -> str:
             "milling radius −0.5 outside, +0.5 inside"
         ),
         "tool_measured": _(
-            "A tool that is measured itself (feature: tool) needs its location R10 and the mode measure_only: its size tells "
-            "its wear, and no correction changes it"
+            "A tool that is measured itself (feature: tool) needs its location R10: its size tells its wear, and corrects that "
+            "offset unless the mode is measure_only"
         ),
+        "contested": _(
+            "Tool {tool} is corrected by {other} already. The size of a tool and the parts that it cuts would undo each other's "
+            "corrections: set one of the two to measure_only first, or give it another location"
+        ).format(tool=data.get("tool"), other=data.get("other")),
+        "factor_of_tool": _(
+            "The factor {value} is negative: the offset of a tool that is longer, or larger, than its nominal size would become "
+            "smaller. As a rule it is +1 for a length or a radius, +2 for a radius at an offset in diameter"
+        ).format(value=f"{data.get('value', 0):+.10g}"),
         "factor_zero": _("The factor must not be 0: nothing would ever be corrected. To only measure, set R10 to 0"),
         "sections": _(
             "{name} {points} do not fit acceptance by {sections} sections; say {sections}, or leave it out"

@@ -40,9 +40,11 @@ def _notes(record: Record, parameters: Parameters, amount: float | None) -> tupl
     size_error = record.decided if in_full else _averaged(record, parameters)
     return (
         ("outstanding", record.outstanding is not None),
+        ("corrections_of_tool", parameters.rules.of_tool and nanometres(record.decided - record.deviation) != 0),
         (
             "part_out_of_tolerance",
-            record.zone in (Zone.ZERO, Zone.AVERAGE, Zone.FULL)
+            not parameters.rules.of_tool
+            and record.zone in (Zone.ZERO, Zone.AVERAGE, Zone.FULL)
             and not within_tolerance(record.deviation, parameters.limits),
         ),
         ("clamped", amount is not None and nanometres(abs(amount)) < nanometres(abs(parameters.factor * size_error))),
@@ -89,6 +91,7 @@ def _of_parameters(name: str) -> Callable[[Record, Parameters], Any]:
 _WORDED: dict[str, Callable[[Record, Parameters], float | int | None]] = {
     "deviation": _of_reading("decided"),
     "raw": _of_reading("deviation"),
+    "worn": lambda record, parameters: record.deviation if parameters.rules.of_tool else record.decided,
     "average": _of_reading("average_after"),
     "averaged": _averaged,
     "number": _of_reading("correction"),
@@ -138,12 +141,12 @@ def _sentence(record: Record, parameters: Parameters) -> str:
             text = _("Deviation %(deviation)s is beyond the tolerance ±%(tolerance)s: corrected in full.")
         case Code.TOOL_WORN_HELD:
             text = _(
-                "Deviation %(deviation)s has reached the wear limit %(wear)s: the tool is worn. "
+                "Deviation %(worn)s has reached the wear limit %(wear)s: the tool is worn. "
                 "Correction %(number)s is held until somebody decides."
             )
         case Code.TOOL_WORN_RELEASED:
             text = _(
-                "Deviation %(deviation)s has reached the wear limit %(wear)s: the tool is worn. "
+                "Deviation %(worn)s has reached the wear limit %(wear)s: the tool is worn. "
                 "Corrected in full, as this characteristic is set to release."
             )
         case Code.PROBE_FAULT:
@@ -159,6 +162,11 @@ def _sentence(record: Record, parameters: Parameters) -> str:
             )
         case Code.MEASURE_ONLY:
             text = _("Deviation %(deviation)s: this characteristic is only measured, nothing is corrected.")
+        case Code.OFFSET_BY_HAND:
+            text = _(
+                "Deviation %(deviation)s: somebody has set the offset of this tool since it was changed, and nobody knows how much "
+                "of the size of the tool is in it. Nothing is corrected until the tool change is reported."
+            )
         case Code.IMPORTED:
             text = _("Deviation %(deviation)s: imported from a file. Judged like any other, it corrects nothing.")
         case Code.BEFORE_TOOL_CHANGE:
@@ -207,6 +215,10 @@ def _note(code: str, record: Record, parameters: Parameters) -> str:
             return _(
                 "The part was cut before correction %(numbers)s took effect: its deviation of %(raw)s counts as %(decided)s."
             ) % {"numbers": numbers, "raw": um(record.deviation), "decided": um(record.decided)}
+        case "corrections_of_tool":
+            return _(
+                "The size of the tool is off by %(raw)s; with its corrections since it was changed that counts as %(decided)s."
+            ) % {"raw": um(record.deviation), "decided": um(record.decided)}
         case "part_out_of_tolerance":
             return _("The part itself is out of tolerance by its deviation of %(raw)s.") % {"raw": um(record.deviation)}
         case "clamped":

@@ -17,7 +17,15 @@ from sqlalchemy.orm import Session
 
 from app.core.decision.limits import FAULT, in_nanometres, nanometres, reaches
 from app.core.decision.loops import Mark, ProcessTrace
-from app.core.decision.step import FIRST_MOVE_TRIGGERED, IMPLAUSIBLE, REJECTED, TOOL_WORN_HELD, TOUCH_FAULT, rounded
+from app.core.decision.step import (
+    FIRST_MOVE_TRIGGERED,
+    IMPLAUSIBLE,
+    OFFSET_BY_HAND,
+    REJECTED,
+    TOOL_WORN_HELD,
+    TOUCH_FAULT,
+    rounded,
+)
 from app.core.parameters import Parameters
 from app.core.period import Period
 from app.core.replay import LONGEST_DELAY, Figures, Policy, ReplayedCharacteristic, parts_of, rebuilt
@@ -302,7 +310,7 @@ def _trace(
     marks = (
         begins * Mark.BEGIN
         + joined["restart"] * Mark.RESTART
-        + (joined["paused"] | unplanned) * Mark.PAUSED
+        + (joined["paused"] | unplanned | (joined["code"] == OFFSET_BY_HAND)) * Mark.PAUSED
         + (joined["code"] == REJECTED) * Mark.REJECTED
         + (joined["code"] == IMPLAUSIBLE) * Mark.JUMP
         + ((step >= held) & ~begins) * Mark.RELEASED

@@ -63,10 +63,11 @@ class _Group:
         return Series(
             parameters,
             state.average.empirical_value if state.average else 0.0,
-            outstanding_effect(effect.amounts, parameters.factor) if effect.outstanding else 0.0,
+            outstanding_effect(effect.amounts, parameters.factor) if effect.amounts else 0.0,
             stream,
             memory,
             quiet=not effect.previous_tool
+            and not parameters.rules.of_tool  # when it was measured counts
             and state.paused_by is None
             and (state.tool is None or state.tool.paused_by is None)
             and parameters.accept_m == 1

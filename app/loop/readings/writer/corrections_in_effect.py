@@ -86,7 +86,7 @@ def corrections_in_effect(
 ) -> CorrectionsInEffect:
     """Return what the part of a reading was cut with; the size of a tool itself depends on no correction."""
     if tool is None or parameters.feature is Feature.TOOL:
-        return WITHOUT_TOOL
+        return _of_tool(pending, tool, reading) if parameters.rules.of_tool and tool is not None else WITHOUT_TOOL
     tally = _tally(pending, tool, reading.correction_in_effect)
     if tally.in_effect is None and tally.has_applied and reading.machined_at is not None:
         tally = _extend(EffectTally(None, None), tool, reading.machined_at)
@@ -101,6 +101,19 @@ def corrections_in_effect(
         compensated = rounded(compensated)
     return CorrectionsInEffect(
         previous_tool, FirstNumbers(tally.numbers) if tally.numbers else (), tally.amounts, compensated
+    )
+
+
+def _of_tool(pending: PendingWrites, tool: PendingTool, reading: ReadingIn) -> CorrectionsInEffect:
+    """Return what the size of the tool itself shows: nothing of all that was corrected since it was changed."""
+    at = reading.machined_at or reading.measured_at
+    if tool.reset_at is not None and at is not None and at < tool.reset_at:
+        return CorrectionsInEffect(previous_tool=True, outstanding=(), amounts=(), compensated=None)
+    if tool.set_by_hand:
+        return WITHOUT_TOOL
+    amounts = (tool.total, *_tally(pending, tool, None).issued)
+    return CorrectionsInEffect(
+        previous_tool=False, outstanding=(), amounts=amounts if any(amounts) else (), compensated=0.0
     )
 
 

@@ -82,10 +82,11 @@ def decide_reading(pending: PendingWrites, entry: Entry, reading: ReadingIn, now
         decide,
         parameters,
         deviation=deviation,
-        outstanding=outstanding_effect(amounts, parameters.factor) if outstanding else 0.0,
+        outstanding=outstanding_effect(amounts, parameters.factor) if amounts else 0.0,
         previous_tool=previous_tool,
         accepted=results is None or not results.rejected,
         jump=jump,
+        by_hand=parameters.rules.of_tool and tool is not None and tool.set_by_hand,
         fault=Code.FIRST_MOVE_TRIGGERED if reading.first_move_triggered else Code.TOUCH_FAULT if fault else None,
     )
     decision, opposed = judged(state=state), None

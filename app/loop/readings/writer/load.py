@@ -44,6 +44,7 @@ class _Stream(msgspec.Struct, array_like=True):
     offset: float | None
     total: float | None
     reset_at: datetime | None
+    set_by_hand: bool | None
     tool_paused_by: int | None
     level: float | None
     level_sequence: int | None
@@ -159,6 +160,7 @@ def _add_stream(
             number,
             since,
             row.applied or (),
+            bool(row.set_by_hand),
         )
     snapshot.streams[row.characteristic_id] = LoadedStream(
         entry,

@@ -123,6 +123,7 @@ class PendingTool:
     # Worked out of `corrections`, and how many of the first ones are known not to be held.
     tallies: dict[int | None, EffectTally] = field(default_factory=dict)
     none_held: int = 0
+    set_by_hand: bool = False
 
     def forget(self) -> None:
         """Drop what was worked out of the corrections: there are others, or one has another status."""
@@ -295,6 +296,7 @@ class PendingWrites:
                 loaded.paused_by,
                 list(loaded.corrections),
                 list(loaded.applied),
+                set_by_hand=loaded.set_by_hand,
             )
         return tool
 

@@ -48,6 +48,7 @@ class LoadedTool(NamedTuple):
 
     paused_by: the alarm that pauses it. Of the applied corrections there are those with a higher number
     than `since_number`, and those applied after `since`. applied: numbers and amounts of the newest, to name them by.
+    set_by_hand: somebody has set the offset since the tool was changed.
     """
 
     machine_id: int
@@ -60,6 +61,7 @@ class LoadedTool(NamedTuple):
     since_number: int | None = None
     since: datetime | None = None
     applied: Sequence[tuple[int, float]] = ()
+    set_by_hand: bool = False
 
 
 class LoadedAverage(NamedTuple):

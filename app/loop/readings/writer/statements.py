@@ -63,7 +63,7 @@ SELECT json_build_object(
     'streams', (
         SELECT json_agg(json_build_array(s.machine_id, s.characteristic_id, s.sequence, s.parameters_version, s.paused_by,
             s.last_measured_at, a.location, a.average, a.empirical_value, t.number, t."offset", t.total, t.reset_at,
-            t.paused_by, s.level, s.level_sequence,
+            t.reset_at > coalesce(t.changed_at, '-infinity'), t.paused_by, s.level, s.level_sequence,
             CASE WHEN t.number IS NOT NULL THEN (
                 SELECT json_agg(json_build_array(
                     c.number, c.amount, c.status, c.applied_at, c.decided_at, c.fetched_at) ORDER BY c.number) FROM (
