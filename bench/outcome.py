@@ -76,7 +76,9 @@ class Process(Model):
         worn = feature.wear * (self.parts - self.new_at.get(feature.tool, 0))
         if self.broken and feature.tool == BROKEN:
             worn += BREAK
-        deviation = worn + scatter + self.amiss * self.offsets[self.place_of(self.swapped.get(feature.tool, feature.tool))]
+        deviation = (
+            worn + scatter + self.amiss * self.offsets[self.place_of(self.swapped.get(feature.tool, feature.tool))]
+        )
         self.sizes.setdefault(feature.number, []).append(deviation)
         return feature.nominal + deviation
 

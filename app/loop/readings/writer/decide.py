@@ -97,9 +97,7 @@ def decide_reading(pending: PendingWrites, entry: Entry, reading: ReadingIn, now
         paused_by, decision = opposed, judged(state=state._replace(paused=True))
     alarms = [_signal(pending, stream, signal, sequence, decision, results, fault) for signal in decision.alarms]
     alarms += [] if opposed is None else [opposed]
-    correction = None
-    if decision.amount is not None and tool is not None:
-        correction = _issue(pending, stream, tool, sequence, decision)
+    correction = _issue(pending, stream, tool, sequence, decision) if tool and decision.amount is not None else None
 
     stream.sequence = sequence
     if average is not None and average.average != decision.average_after:
