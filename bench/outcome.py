@@ -183,12 +183,13 @@ class Play:
             for feature in process.features:
                 size = process.size(feature)
                 failed = feature.number == 1 and 0 < process.blind <= part
+                found: dict[str, Any] = {"touches": []} if failed else {"measured": round(size, 6)}
                 self.call(
                     "POST",
                     "/readings",
                     characteristic=self.keys[feature.number],
                     correction_in_effect=in_effect.get(feature.tool, 0),
-                    **({"touches": []} if failed else {"measured": round(size, 6)}),
+                    **found,
                 )
                 if wait == 0:
                     self._apply(feature.tool, in_effect)
