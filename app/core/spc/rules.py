@@ -24,6 +24,7 @@ that point lies beyond the limit itself.
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from enum import IntEnum, StrEnum
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -253,42 +254,50 @@ def _fed(
     return equal_runs(z, offset, last, int(rule.kind), rule.n, rule.limit, state[0], earlier)
 
 
-def signals(z: ArrayLike, rules: Iterable[Rule] = NELSON) -> Signals:
-    """Every signal of these rules on these points.
+def signals(z: ArrayLike, rules: Iterable[Rule] = NELSON, anew: Iterable[int] = ()) -> Signals:
+    """Every signal of these rules on these points. anew: places, ascending, where the rules begin again: no run goes over one.
 
     >>> [(run.rule.value, run.start, run.end) for run in signals([0.1] * 9 + [-0.1])]
     [('nelson_2', 0, 8)]
+    >>> [(run.start, run.end) for run in signals([0.1] * 18, anew=[4])]
+    [(4, 17)]
     """
-    scan = Scan(rules)
-    scan.feed(z)
-    return scan.signals()
+    points, chosen = checked(z), tuple(rules)
+    edges = sorted({0, len(points), *(place for place in anew if 0 < place < len(points))})
+    found: dict[RuleName, list[NDArray[np.int64]]] = {rule.name: [] for rule in chosen}
+    for begin, end in pairwise(edges):
+        scan = Scan(chosen)
+        scan.feed(points[begin:end])
+        for name, rows in scan.signals().runs.items():
+            found[name].append(rows + np.array([0, begin, begin, 0]))
+    return Signals(len(points), {name: np.concatenate(rows) for name, rows in found.items()})
 
 
-def signals_of(chart: ControlChart, rules: Iterable[Rule] = NELSON) -> Signals:
-    """The signals of a chart: of the rules that fit it, with rule 1 at the limits that the chart has."""
+def signals_of(chart: ControlChart, rules: Iterable[Rule] = NELSON, anew: Iterable[int] = ()) -> Signals:
+    """The signals of a chart: of the rules that fit it, with rule 1 at the limits that the chart has. anew: as above."""
     width = chart.baseline.width
     fitting = [
         Rule(rule.name, rule.kind, rule.n, rule.k, width) if rule.name is RuleName.NELSON_1 else rule
         for rule in rules
         if rule.name in FITTING[chart.chart]
     ]
-    return signals(chart.z, fitting)
+    return signals(chart.z, fitting, anew)
 
 
-def signals_of_cusum(chart: Cusum) -> Signals:
+def signals_of_cusum(chart: Cusum, anew: Iterable[int] = ()) -> Signals:
     """The signals of a CUSUM: runs of points whose upper (side 1) or lower sum (side -1) is above h.
 
-    When the change began is another question: `Cusum.since_above` points back to where the sum left 0.
+    When the change began is another question: `Cusum.since_above` points back to where the sum left 0. anew: as `signals`.
 
     >>> from app.core.spc.cusum import cusum
     >>> from app.core.spc.shewhart import given
     >>> list(signals_of_cusum(cusum(given(0, 1), [2.0, 2.0, 2.0, 2.0, -9.0])))[0]
     Run(rule=<RuleName.NELSON_1: 'nelson_1'>, side=1, start=3, end=3, points=1)
     """
-    none = np.empty((0, 4), np.int64)
+    once = [Rule(RuleName.NELSON_1, RuleKind.BEYOND, 1, 1, chart.limit)]
     rows = []
     for side, sums in ((1, chart.above), (-1, chart.below)):
-        runs = beyond_runs(sums, 0, 1, 1, 1, chart.limit, np.zeros(STATE, np.int64), none)
+        runs = signals(sums, once, anew).runs[RuleName.NELSON_1] if len(sums) else np.empty((0, 4), np.int64)
         runs[:, 0] = side
         rows.append(runs)
     together = np.concatenate(rows)

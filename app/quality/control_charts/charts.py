@@ -28,7 +28,7 @@ from app.quality.control_charts import queries
 from app.quality.control_charts.monitoring import Place
 from app.quality.control_charts.queries import LOOK_BACK, Charted, charted, judged_by
 from app.quality.control_charts.rules_queries import rules_in_force
-from app.quality.control_charts.series_queries import read
+from app.quality.control_charts.series_queries import Whole, read
 from app.quality.control_charts.tables import Baseline
 from app.quality.control_charts.view import Marks, View, only, since
 
@@ -99,7 +99,11 @@ def _drawn(
         return main
     on = _switched_on(session, current) if watched is None else set(watched)
     chosen = [RULES[name] for name in queries.rules_of(baseline) if name in on]
-    main = replace(main, settling=_settling(points, window), signals=rules.signals_of(points.chart, chosen))
+    main = replace(
+        main,
+        settling=_settling(points, window),
+        signals=rules.signals_of(points.chart, chosen, _anew(baseline, points.first)),
+    )
     return since(main, window.first)
 
 
@@ -154,20 +158,35 @@ def _view(points: Charted, kind: Chart, chart: ControlChart | None, kept: NDArra
     )
     if chart is None:
         return view
-    return replace(view, centre=chart.centre, lower=chart.lower, upper=chart.upper, signals=_limits_only(chart))
+    return replace(
+        view,
+        centre=chart.centre,
+        lower=chart.lower,
+        upper=chart.upper,
+        signals=_limits_only(chart, _anew(points.baseline, view.first)),
+    )
 
 
-def _limits_only(chart: ControlChart) -> Signals:
-    return rules.signals_of(chart, [RULES[RuleName.NELSON_1]])
+def _limits_only(chart: ControlChart, anew: Iterable[int]) -> Signals:
+    return rules.signals_of(chart, [RULES[RuleName.NELSON_1]], anew)
+
+
+def _anew(baseline: Baseline, first: Whole) -> list[int]:
+    """The points at which the rules begin again: the first of the baseline's period, and the first that is monitored.
+
+    What lies before the period was another process. The stored signals begin with the first reading after it.
+    """
+    return [int(at) for at in np.searchsorted(first, [baseline.first_sequence, baseline.last_sequence + 1])]
 
 
 def _moving_ranges(points: Charted, window: Window) -> View:
-    """Ranges of neighbours; none over a change of tool or of the reference. Lies where the second of both does."""
+    """Ranges of neighbours; none over a change of tool, of the reference or of the process. Lies where the second does."""
     before = points.series.sequence < window.first
     start = max(0, int(before.sum()) - 1)
     series = points.series.only(np.arange(len(points.series)) >= start)
     neighbours = ~series.begins
-    neighbours[:1] = False
+    for at in (0, *_anew(points.baseline, series.sequence)):
+        neighbours[at : at + 1] = False
     empty = View(
         Chart.MOVING_RANGE,
         Quantity(points.baseline.quantity),
@@ -188,7 +207,7 @@ def _moving_ranges(points: Charted, window: Window) -> View:
         centre=chart.centre,
         lower=chart.lower,
         upper=chart.upper,
-        signals=_limits_only(chart),
+        signals=_limits_only(chart, _anew(points.baseline, empty.first)),
     )
 
 
@@ -210,8 +229,7 @@ def _remembering(
     points = charted(session, current, singly, replace(window, first=begin))
     series = points.series.only(points.series.sequence >= begin)  # what was read before set levels
     sequence, values = series.sequence, series.values
-    monitored = sequence > baseline.last_sequence
-    pieces = [part for part in (values[~monitored], values[monitored]) if len(part)]
+    pieces = [part for part in np.split(values, _anew(baseline, sequence)) if len(part)]
     inside = sequence >= window.first
     view = View(
         kind,
@@ -247,7 +265,7 @@ def _remembering(
         centre=together.centre,
         lower=together.lower,
         upper=together.upper,
-        signals=_limits_only(together),
+        signals=_limits_only(together, _anew(baseline, view.first)),
     )
 
 
@@ -290,5 +308,5 @@ def _sums(view: View, baseline: Baseline, pieces: list[Floats], shown: NDArray[n
         centre=0.0,
         lower=-together.limit,
         upper=together.limit,
-        signals=rules.signals_of_cusum(together),
+        signals=rules.signals_of_cusum(together, _anew(baseline, view.first)),
     )

@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 from functools import cached_property
 
+import numpy as np
 from scipy.special import pdtrc
 from sqlalchemy import select
 from sqlalchemy.orm import Session
@@ -120,9 +121,13 @@ def preview(session: Session, current: CurrentCharacteristic, rules: Rules, last
 
 
 def _found(baseline: Baseline, place: Place, names: tuple[RuleName, ...], piece: Piece | None) -> list[SignalSpan]:
+    """By the points of the baseline's period, and again by those after it and before it, as the chart and the job do."""
     if piece is None or not names:
         return []
-    return Watch(settings_at(baseline, place), dict.fromkeys(names, 0)).feed(piece)
+    parts = np.searchsorted(piece.first, [baseline.first_sequence, baseline.last_sequence + 1])
+    at = np.searchsorted(parts, np.arange(len(piece.first)), side="right")
+    pieces = (piece.only(at == part) for part in np.unique(at))
+    return [span for each in pieces for span in Watch(settings_at(baseline, place), dict.fromkeys(names, 0)).feed(each)]
 
 
 def _tried(

@@ -59,6 +59,26 @@ class TestByHand:
             1 + 3 / D2 * sqrt(2 - 4 / pi)
         )  # D4 R, d3 = sqrt(2 - d2^2)
 
+    def test_rules_begin_again_with_a_new_baseline(self, gauged: Shop) -> None:
+        """Thirty readings about 0, forty about 6 µm: the ten on one side of the new centre were another process."""
+        rules = {"main": dict.fromkeys(("nelson_1", "nelson_2", "nelson_3", "nelson_4"), "watch")}
+        rules |= {place: {"nelson_1": "watch"} for place in ("scatter", "ewma", "moving_average", "cusum")}
+        path = f"/characteristics/{gauged.characteristic}/rules"
+        gauged.push([-1, 1, 0, 1] * 7 + [-1, 1])
+        gauged.push([5, 7, 6, 6] * 9 + [5, 7, 6, 7])
+        frozen(gauged, 31, 70)
+        gauged.call("PUT", path, rules=rules, reason="all")
+        for chart in ("individuals", "moving_range", "ewma", "moving_average", "cusum"):
+            shown = control(gauged, chart=chart, first=20)
+            inside = [(s["rule"], s["first"], s["last"]) for s in shown["signals"] if s["last"] >= 31]
+            assert inside == [], chart
+        assert 31 not in control(gauged, chart="moving_range", first=20)["points"]["last"]
+        tried = gauged.call("GET", f"{path}/preview?last=45")
+        assert {each["signals"] for each in tried["rules"] if each["do"]} == {0}
+        gauged.push([6.5] * 9)
+        after = [(s["rule"], s["first"], s["last"]) for s in control(gauged, first=31)["signals"]]
+        assert after == [("nelson_2", 71, 79)], "as the job stores it, without the reading before it"
+
     def test_subgroups(self, gauged: Shop) -> None:
         """Pairs (0, 2) and (1, 3): every range 2, every s sqrt(2), grand mean 1.5."""
         gauged.push([0, 2, 1, 3] * 10)
