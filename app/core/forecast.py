@@ -5,8 +5,8 @@ J. R. Stat. Soc. B 16, 175), with the scatter of a single part added, is that of
 Wear does not go on straight: an edge runs in, wears evenly, then steeply (ISO 3685:1993, tool-life testing with single-point
 turning tools). So both ends are moved outwards, with `seen` the parts that the line was fitted over::
 
-    soonest = low / (3 + low / seen) ** widening        a steep end may begin at any moment, also with the next part
-    latest = high * (1 + high / seen) ** widening       wear may slow down, as after a run-in; the further ahead, the more
+    soonest = low / (3 + 3 low / (low + seen)) ** widening     a steep end may begin at any moment, also with the next part
+    latest = high * (1 + high / seen) ** widening              wear may slow down, as after a run-in; the further ahead, the more
 
 *Widening* is what earlier edges needed: the exponent with which 95 % of the forecasts made on them would have held
 (`backtest`; split conformal prediction, Vovk et al. 2005, Algorithmic learning in a random world). Until `ENOUGH` edges are over
@@ -23,8 +23,8 @@ from numpy.typing import NDArray
 
 from app.core.wear import LEVEL, NEAR, Fit, Values, fit, off_of
 
-STEEP = 3.0  # times as fast an edge may wear from now on, where widening is 1
-PUBLIC_WIDENING = 1.35  # exponent that public wear series need: docs/reference/wear.md
+STEEP = 3.0  # times as fast an edge may wear from the next part on, where widening is 1; far ahead up to twice that
+PUBLIC_WIDENING = 1.4  # exponent that public wear series need: docs/reference/wear.md
 ENOUGH = 8  # tool lives from which on their own exponent alone holds
 LEAST_WIDENING, MOST_WIDENING = (
     0.5,
@@ -74,7 +74,7 @@ def forecast(fit: Fit, limit: float, widening: float = PUBLIC_WIDENING) -> Forec
     >>> w = np.arange(40) * 0.0001 + np.array([0.001, -0.001] * 20)
     >>> f = forecast(wear.fit(np.arange(1, 41), w), 0.0139)
     >>> round(f.parts), round(f.low), round(f.high)
-    (105, 9, 1456)
+    (105, 8, 1579)
     """
     straight = _straight(fit, limit)
     if straight is None:
@@ -90,7 +90,7 @@ def cone(fit: Fit, ahead: Values, widening: float = PUBLIC_WIDENING) -> tuple[Va
     >>> from app.core import wear
     >>> line = wear.fit(np.arange(1, 41), np.arange(40) * 0.0001 + np.array([0.001, -0.001] * 20))
     >>> [ends.round(4).tolist() for ends in cone(line, np.array([0.0, 18.7]), 1.0)]
-    [[0.0017, 0.0029], [0.006, 0.0181]]
+    [[0.0017, 0.0029], [0.006, 0.0169]]
     """
     straight = np.concatenate(([0.0], np.geomspace(0.01, MOST_AHEAD * max(float(ahead.max()), 1.0), 1_000)))
     sooner = np.array([_sooner(fit, distance, widening) for distance in straight])
@@ -112,7 +112,7 @@ def backtest(lives: Sequence[tuple[NDArray[np.int64], Values]]) -> Record:
 
     >>> w = np.arange(200) * 0.0001 + np.array([0.001, -0.001] * 100)
     >>> backtest([(np.arange(1, 201), w)])
-    Record(lives=1, tested=4, held=4, widening=1.35)
+    Record(lives=1, tested=4, held=4, widening=1.4)
     """
     held = counted = 0
     needed: list[float] = []
@@ -144,7 +144,7 @@ def widening_after(lives: int, taught: float) -> float:
     """The exponent for the next edge, after so many lives that taught this one.
 
     >>> widening_after(0, 0.0), widening_after(2, 1.9), widening_after(ENOUGH, 0.8), widening_after(9, 0.0)
-    (1.35, 1.9, 0.8, 0.5)
+    (1.4, 1.9, 0.8, 0.5)
     """
     return min(MOST_WIDENING, max(LEAST_WIDENING if lives >= ENOUGH else PUBLIC_WIDENING, taught))
 
@@ -171,7 +171,7 @@ def _needed(fit: Fit, straight: Forecast, truth: float) -> float:
     if straight.low <= truth <= straight.high:
         return 0.0
     if truth < straight.low:
-        return log(straight.low / truth) / log(STEEP + straight.low / _seen(fit))
+        return log(straight.low / truth) / log(_steep(fit, straight.low))
     return log(truth / straight.high) / log(1 + straight.high / _seen(fit))
 
 
@@ -180,11 +180,14 @@ def _seen(fit: Fit) -> int:
     return fit.last - fit.first + 1
 
 
+def _steep(fit: Fit, parts: float) -> float:
+    """By how many times wear that ends steeply may be faster than the line, so many parts ahead."""
+    return STEEP * (1 + parts / (parts + _seen(fit)))
+
+
 def _sooner(fit: Fit, parts: float, widening: float) -> float:
-    """The parts after which a steep end may be where the line is after `parts`; never fewer than for a nearer place."""
-    if widening > 1:
-        parts = min(parts, STEEP * _seen(fit) / (widening - 1))
-    return float(parts / (STEEP + parts / _seen(fit)) ** widening)
+    """The parts after which a steep end may be where the line is after `parts`; more for a farther place, up to a widening of 5.8."""
+    return float(parts / _steep(fit, parts) ** widening)
 
 
 def _later(fit: Fit, parts: float, widening: float) -> float:

@@ -47,9 +47,14 @@ def test_the_forecast_reaches_the_limit_where_the_line_does() -> None:
 
 
 def test_the_interval_by_hand() -> None:
-    """A line of 100 parts known exactly, 100 parts ahead: soonest after 100 / (3 + 1), latest after 100 x (1 + 1) parts, to the power."""
+    """A line of 100 parts known exactly, 100 parts ahead: soonest after 100 / (3 + 3 / 2), latest after 100 x (1 + 1) parts, to the power."""
     straight = fitted(line(100, 0.0001, 0.0000001, seed=1))
-    for widening, low, high in ((1.0, 25, 200), (2.0, 100 / 16, 400), (0.5, 50, 100 * 2**0.5), (0.0, 100, 100)):
+    for widening, low, high in (
+        (1.0, 100 / 4.5, 200),
+        (2.0, 100 / 4.5**2, 400),
+        (0.5, 100 / 4.5**0.5, 100 * 2**0.5),
+        (0.0, 100, 100),
+    ):
         told = forecast(straight, 0.0199, widening)
         assert told is not None
         assert told.low == pytest.approx(low, rel=0.02)
@@ -63,6 +68,16 @@ def test_near_the_end_a_steep_end_is_allowed_for() -> None:
     assert told is not None
     assert told.parts == pytest.approx(10, rel=0.01)
     assert told.low < 10 / STEEP
+
+
+def test_far_ahead_the_soonest_end_keeps_in_proportion() -> None:
+    """A limit forty times as far as was seen: at most six times as fast, not at once."""
+    straight = fitted(line(100, 0.0001, 0.0000001, seed=1))
+    near, far = forecast(straight, straight.level + 0.01, 1.0), forecast(straight, straight.level + 0.4, 1.0)
+    assert near is not None
+    assert far is not None
+    assert far.low > 4000 / (2 * STEEP)
+    assert far.low > 30 * near.low
 
 
 def test_the_cone_comes_to_the_limit_after_the_parts_of_the_interval() -> None:

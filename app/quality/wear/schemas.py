@@ -57,7 +57,7 @@ class RecordOut(BaseModel):
         description="How many held the true number of parts in their interval, each as wide as the lives before it had taught."
     )
     widening: float = Field(
-        description="Exponent of (3 + parts / parts seen) at the low end and of (1 + parts / parts seen) at the high end, by "
+        description="Exponent of (3 + 3 parts / (parts + parts seen)) at the low end and of (1 + parts / parts seen) at the high end, by "
         "which the interval is moved outwards."
     )
     widened: bool = Field(
