@@ -23,6 +23,7 @@ from app.language.times import plant_zone
 from app.loop.characteristics import queries as characteristics
 from app.loop.characteristics.queries import CurrentCharacteristic
 from app.loop.readings import exporting, queries
+from app.loop.readings.origin import EMPIRICAL, guid_of
 from app.loop.tables.tools import Correction, ToolEvent
 
 MOST = 1000
@@ -34,10 +35,11 @@ ZONES = {
     Zone.PROBE_FAULT: "probe fault",
 }
 EVENTS = (CORRECTION, CHANGED, EXCLUDED, *ZONES.values())
-IN_EFFECT, EMPIRICAL, NUMBER = "offset in effect, mm", "empirical value, mm", "correction in effect"
+IN_EFFECT, NUMBER = "offset in effect, mm", "correction in effect"
+GUID = "K0097"
 PROCESS = (IN_EFFECT, NUMBER, EMPIRICAL)
 """K0011: the location's offset where it is known, the last correction in effect, and what was taken off the measured size."""
-OF_THE_READING = {"K0001", "K0002", "K0004", "K0014", "K0053"}
+OF_THE_READING = {"K0001", "K0002", "K0004", "K0014", "K0053", GUID}
 """Fields that the reading itself fills. One that a sender put beside it would be another value, or another time or part."""
 
 
@@ -140,7 +142,8 @@ def _values(session: Session, of: _Of, *, period: Period, last: int | None) -> I
             gauge=context.get("gauge") or machine.key,
             process=(context.get("process") or {}) | _process(row, offsets),
             comment=context.get("comment") or "",
-            fields={name: text for name, text in kept.items() if name not in OF_THE_READING},
+            fields={name: text for name, text in kept.items() if name not in OF_THE_READING}
+            | {GUID: guid_of(row["sequence"], row["received_at"])},
         )
 
 

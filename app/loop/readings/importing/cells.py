@@ -11,13 +11,15 @@ from datetime import datetime
 from itertools import islice
 from pathlib import Path
 from typing import Any, NamedTuple
+from zoneinfo import ZoneInfo
 
 from app.files.formats import cell_values, delimited, spreadsheet
 from app.files.formats.cell_values import Unreadable
 from app.files.formats.delimited import Row, Unusable
 from app.files.formats.units import LENGTHS
 from app.language.i18n import _
-from app.loop.readings.importing.layout import Layout, Wishes, look, rows_of
+from app.loop.readings.importing.layout import ORIGIN, Layout, Wishes, look, rows_of
+from app.loop.readings.origin import Origin
 
 MOST_FLAWS = 200
 SHOWN = 60  # characters of a wrong value
@@ -171,7 +173,16 @@ def _of_row(row: Row, layout: Layout, readers: Sequence["_Reader"]) -> Iterator[
             flawed = True
             yield Flaw(row.line, layout.named(name), shown(text), str(error))
     if not flawed:
-        yield values
+        yield _with_origin(values)
+
+
+def _with_origin(values: dict[str, Any]) -> dict[str, Any]:
+    """The same with the origin of a reading that Inband wrote in place of its columns."""
+    sequence, received_at, measured = (*map(values.pop, ORIGIN, (None, None)), values.get("measured"))
+    number = int(sequence) if str(sequence).isascii() and str(sequence).isdigit() else 0
+    if 0 < number < 1 << 40 and isinstance(received_at, datetime) and isinstance(measured, int | float):
+        values["origin"] = Origin(number, received_at, float(measured))
+    return values
 
 
 _Reader = tuple[str, tuple[int, ...], Callable[[str], Any]]
@@ -207,10 +218,19 @@ def _readers(layout: Layout) -> list[_Reader]:
         "measured_at": time,
         "machined_at": lambda text: time(text) if text else None,
         "correction_in_effect": whole,
+        "received_at": lambda text: _or_none(text, zone),
         "touches": _touches,
         "context": _context,
     }
     return [(name, places, kinds.get(name, lambda text: text or None)) for name, places in layout.columns.items()]
+
+
+def _or_none(text: str, zone: ZoneInfo | None) -> datetime | None:
+    """A time that Inband wrote; of a file that somebody has changed, none."""
+    try:
+        return cell_values.moment(text, zone)
+    except Unreadable:
+        return None
 
 
 def _touches(text: str) -> Any:
@@ -248,7 +268,7 @@ def _of_object(number: int, value: Any, layout: Layout) -> Iterator["dict[str, A
     flaws = list(_converted(values, layout, number))
     yield from flaws
     if not flaws:
-        yield values
+        yield _with_origin(values)
 
 
 def objects(path: Path, kind: str) -> Iterator[tuple[int, Any]]:
@@ -275,6 +295,8 @@ def _converted(values: dict[str, Any], layout: Layout, number: int) -> Iterator[
     scale = LENGTHS[layout.unit]
     if scale != 1.0 and isinstance(values.get("measured"), int | float) and abs(values["measured"]) < 1e300:
         values["measured"] = round(values["measured"] * scale, 9)
+    if isinstance(values.get("received_at"), str):
+        values["received_at"] = _or_none(values["received_at"], layout.zone)
     for name in ("measured_at", "machined_at"):
         if isinstance(values.get(name), str):
             try:

@@ -29,6 +29,7 @@ from app.loop.characteristics.queries import CurrentCharacteristic
 from app.loop.machines import queries as machines
 from app.loop.readings.importing.cells import MOST_FLAWS, Flaw
 from app.loop.readings.importing.lines import Line
+from app.loop.readings.origin import SAME
 from app.loop.readings.records import Entry
 from app.loop.readings.wording import touch_problem
 from app.loop.readings.writer.save import full_blocks
@@ -40,14 +41,23 @@ Progress = Callable[[], None]
 STAGE = """
 CREATE TEMPORARY TABLE staged (line bigint, key text, measured float8, deviation float8, average_before float8,
     average_after float8, measured_at timestamptz, machined_at timestamptz, zone text, part text, touches jsonb, results jsonb,
-    context jsonb
+    context jsonb, origin bigint, origin_at timestamptz, origin_measured float8
 ) ON COMMIT DROP
 """
 COPY = """
 COPY staged (line, key, measured, deviation, average_before, average_after, measured_at, machined_at, zone, part, touches,
-    results, context)
+    results, context, origin, origin_at, origin_measured)
 FROM STDIN
 """
+# What Inband wrote itself, by number and moment of arrival, and there with another size.
+_OURS = """
+r.machine_id = %(machine)s AND r.characteristic_id = %(characteristic)s AND r.sequence = s.origin AND r.received_at = s.origin_at
+"""
+CHANGED = f"""
+SELECT s.line, s.key, s.origin_measured, r.measured, r.sequence, NULL::bigint FROM staged s
+JOIN reading r ON {_OURS} WHERE abs(r.measured - s.origin_measured) >= {SAME} ORDER BY 1 LIMIT %(most)s
+"""  # noqa: S608 - made of our own texts
+FORGET_OURS = f"DELETE FROM staged s USING reading r WHERE {_OURS}"  # noqa: S608
 # The same key with another value, in the record or further up in the file.
 CLASHES = """
 SELECT s.line, s.key, s.measured, r.measured, r.sequence, NULL::bigint FROM staged s
@@ -186,6 +196,7 @@ class _Judge:
             None if reading.touches is None else msgspec.json.encode(reading.touches).decode(),
             None if results is None else msgspec.json.encode(results._asdict()).decode(),
             None if reading.context is None else msgspec.json.encode(reading.context).decode(),
+            *(line.origin or (None, None, None)),
         )
 
 
@@ -309,10 +320,10 @@ def _refuse_new_empirical_value(then: float, now: float) -> None:
 def _move_over(cursor: Cursor[Any], entry: Entry, version: int, now: datetime, summary: Summary) -> None:
     """Under the machine's lock: out with what is there already, then number and store the rest."""
     where: dict[str, Any] = {"machine": entry.machine_id, "characteristic": entry.characteristic_id}
-    clashes = cursor.execute(CLASHES, where | {"most": MOST_FLAWS}).fetchall()
-    if clashes:
-        raise Flawed([_clash(*row) for row in clashes], len(clashes))
-    cursor.execute(FORGET_STORED, where)
+    for statement, forget in ((CHANGED, FORGET_OURS), (CLASHES, FORGET_STORED)):
+        if clashes := cursor.execute(statement, where | {"most": MOST_FLAWS}).fetchall():
+            raise Flawed([_clash(*row) for row in clashes], len(clashes))
+        cursor.execute(forget, where)
     cursor.execute(FORGET_REPEATED)
     found = cursor.execute(
         "SELECT sequence, last_measured_at FROM stream WHERE machine_id = %(machine)s"

@@ -13,6 +13,7 @@ from app.files.formats import cell_values, delimited, spreadsheet
 from app.files.formats.delimited import Row, Unusable
 from app.files.formats.units import LENGTHS, UnknownUnit, unit_in
 from app.language.i18n import _
+from app.loop.readings.origin import COLUMNS
 
 # Folded: lower case, no accents, no unit. The first of a line is the field's own name.
 NAMES: dict[str, tuple[str, ...]] = {
@@ -45,6 +46,8 @@ NAMES: dict[str, tuple[str, ...]] = {
 }  # fmt: skip
 MOST_COLUMNS = 500
 TOP = 50  # rows in which the header is looked for
+ORIGIN = COLUMNS[:2]
+"""Fields that are no choice of a person: they are there in what Inband wrote."""
 DATES = {"date", "datum", "дата", "датум"}
 TIMES = {"time", "zeit", "uhrzeit", "vreme", "cas", "время", "време"}
 
@@ -362,4 +365,6 @@ def _guesses(header: tuple[str, ...]) -> dict[str, tuple[int, ...]]:
     time = next((place for place, each in enumerate(names) if each in TIMES), None)
     if date is not None and time is not None:
         guesses["measured_at"] = (date, time)
+    if set(COLUMNS) <= set(header):
+        guesses |= {name: (header.index(name),) for name in ORIGIN}
     return guesses

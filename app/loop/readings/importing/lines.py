@@ -12,14 +12,16 @@ from app.files.apart import PREFIX, apart, spend
 from app.files.formats.delimited import Unusable
 from app.loop.readings.importing.cells import Flaw, Looked, fingerprint, items, looked, put_down, shown, taken
 from app.loop.readings.importing.layout import Layout, Wishes, wrong
+from app.loop.readings.origin import Origin, guid_of
 from app.loop.readings.schemas import ReadingIn, reading_of
 
 
 class Line(NamedTuple):
-    """A line that can be a reading."""
+    """A line that can be a reading. origin: of which Inband wrote it."""
 
     number: int
     reading: ReadingIn
+    origin: Origin | None = None
 
 
 Read = Callable[[int, str], Iterator[Line | Flaw]]
@@ -68,12 +70,13 @@ def _readings(
             yield item
             continue
         item["characteristic"] = characteristic
+        origin: Origin | None = item.pop("origin", None)
         if item.get("touches") is not None:
             item.pop("measured", None)  # it is made of them
         if item.get("key") is None:
-            item["key"] = f"file:{mark}:{number}"
+            item["key"] = f"inband:{guid_of(*origin[:2])}" if origin else f"file:{mark}:{number}"
         try:
-            yield Line(number, reading_of(item, now))
+            yield Line(number, reading_of(item, now), origin)
         except Invalid as refusal:
             for error in refusal.errors:
                 column = layout.named(error.field.partition(".")[0]) or error.field

@@ -17,7 +17,7 @@ from app.loop.characteristics.queries import CurrentCharacteristic
 from app.loop.readings import queries
 from app.loop.readings.importing.cells import MOST_FLAWS, Flaw
 from app.loop.readings.importing.history import Flawed, Progress, Summary, store_history
-from app.loop.readings.importing.layout import Layout, unit_of
+from app.loop.readings.importing.layout import ORIGIN, Layout, unit_of
 from app.loop.readings.importing.lines import Read, lines, read_apart
 from app.loop.readings.records import Entry
 
@@ -59,7 +59,9 @@ def columns_by_name(layout: Layout, known: Sequence[CurrentCharacteristic]) -> d
 
 def layout_of(layout: Layout, column: Column, unit: str | None) -> Layout:
     """The layout by which one column is read; without a unit that somebody said, that of its header counts, else mm."""
-    fields = {name: places for name, places in layout.columns.items() if name not in {"measured", "touches", "key"}}
+    fields = {
+        name: places for name, places in layout.columns.items() if name not in {"measured", "touches", "key", *ORIGIN}
+    }
     own_unit = unit_of(layout.header[column.place], unit)
     return replace(layout, columns=fields | {"measured": (column.place,)}, unit=own_unit, skips_blank=True)
 

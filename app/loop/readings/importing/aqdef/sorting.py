@@ -22,6 +22,7 @@ from app.files.formats.aqdef_times import DayOrder, Slashed, WallClock, slashed
 from app.files.formats.aqdef_values import Value
 from app.language.i18n import _
 from app.loop.readings.importing.cells import MOST_FLAWS, Flaw, fingerprint
+from app.loop.readings.origin import named_by
 
 AT_ONCE = 20_000  # readings in memory before they are put down
 
@@ -52,6 +53,7 @@ class Kept(msgspec.Struct, array_like=True):
     part: str
     key: str
     context: dict[str, Any] | None = None
+    guid: str = ""  # of a reading that Inband wrote
 
 
 @dataclass
@@ -180,4 +182,10 @@ class _Sorter:
         if read.attribute:
             readings.excluded.setdefault(index, {}).setdefault(read.attribute, []).append(key)
         context = context_of(value, read, self._description, self._remark)
-        return Kept(value.line, measured, at, (read.part or read.batch)[:128], key, context or None)
+        guid = value.fields.get("K0097", "")
+        if named_by(guid) is None:
+            guid = ""
+        else:  # of where the file comes from: this reading will have one of its own
+            further = {name: text for name, text in context.pop("fields").items() if name != "K0097"}
+            context |= {"fields": further} if further else {}
+        return Kept(value.line, measured, at, (read.part or read.batch)[:128], key, context or None, guid)
