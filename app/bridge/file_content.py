@@ -28,10 +28,12 @@ from app.files.formats.aqdef_context import context_of
 from app.files.formats.aqdef_keys import Keys
 from app.files.formats.aqdef_times import WallClock, day_order, slashed
 from app.files.formats.cell_values import Unreadable, zone_named
+from app.files.formats.repeats import Repeats
 from app.files.formats.units import LENGTHS, UnknownUnit, length_unit, unit_in
 
 NAMES: Final = {"csv": "*.csv", "ndjson": "*.ndjson", "text": "*.txt", "aqdef": "*.df[qdxQDX]"}
 NOT_ALONE: Final = 2  # files of a pair
+TITLES: Final = 50  # rows in which the names of the columns are looked for
 
 
 class Settings(Struct, forbid_unknown_fields=True, frozen=True):
@@ -46,7 +48,7 @@ class Settings(Struct, forbid_unknown_fields=True, frozen=True):
     names in ``characteristics`` are columns of sizes. lines: regular expressions with fields as named groups; one without
     ``measured`` holds for the lines below. decimal, delimiter, encoding: of the text; the last two are found out if they are
     left out. times: the form of times, as strptime has it. zone: of times without an offset. day_first: in dates
-    with strokes, AQDEF only. others: readings of a characteristic that has no name in ``characteristics`` make the file fail,
+    with strokes, AQDEF only. missing: marks in place of a size that was not measured. others: readings of a characteristic that has no name in ``characteristics`` make the file fail,
     or are passed over. decisions: an absolute path, of a file that says `stop` or `hold`; whoever acts on it removes it.
     """
 
@@ -67,6 +69,7 @@ class Settings(Struct, forbid_unknown_fields=True, frozen=True):
     times: str | None = None
     zone: str | None = None
     day_first: bool | None = None
+    missing: tuple[str, ...] = ()
     others: Literal["fail", "skip"] = "fail"
     decisions: str | None = None
 
@@ -93,8 +96,8 @@ class Settings(Struct, forbid_unknown_fields=True, frozen=True):
                 raise ValueError(
                     f"encoding = {self.encoding!r} is not known; known are utf-8, cp1252, cp1250 …"
                 ) from None
-        if self.delimiter is not None and len(self.delimiter) != 1:
-            raise ValueError("delimiter is one character")
+        if self.delimiter is not None and len(self.delimiter) != 1 and self.delimiter != "blanks":
+            raise ValueError("delimiter is one character, or blanks for two of them and more")
         if self.format == "text":
             check_expressions(self.lines)
 
@@ -173,6 +176,19 @@ def files_of(path: Path) -> tuple[Path, ...]:
     return (source.description,) if source.values is None else (source.description, source.values)
 
 
+def _header(rows: Iterator[delimited.Row], wanted: set[str]) -> delimited.Row | None:
+    """The row that names the columns: the first one, below titles the one that has all that are wanted."""
+    first = next(rows, None)
+    if first is None or not wanted:
+        return first
+    row: delimited.Row | None = first
+    for _count in range(TITLES):
+        if row is None or wanted <= {cell.strip().lstrip("\ufeff") for cell in row.cells}:
+            return row or first
+        row = next(rows, None)
+    return first
+
+
 def _passed_over(item: aqdef_values.Value, value: aqdef_values.Measured | None) -> str:
     if value is None and not item.fields.get("K0001", "").strip():
         return "has no value; passed over"
@@ -207,6 +223,7 @@ class _Reader:
             if path != self.path:
                 seed.update(path.read_bytes())
         self._prefixes(seed)
+        self.remarks = Repeats()
         if earlier is not None and earlier[0] in self.prefix:
             content.stamp = earlier[1]
 
@@ -231,14 +248,18 @@ class _Reader:
                 self._text()
             case "aqdef":
                 self._aqdef()
+        self.content.remarks = self.remarks.sentences()
 
     # --- tables
 
     def _csv(self) -> Iterator[tuple[int, Mapping[str, Any]]]:
         try:
-            delimiter = self.settings.delimiter or delimited.delimiter_of(self.path, self.encoding)
+            said = self.settings.delimiter
+            delimiter = (
+                delimited.BLANKS if said == "blanks" else said or delimited.delimiter_of(self.path, self.encoding)
+            )
             rows = delimited.rows(self.path, self.encoding, delimiter)
-            header = next(rows, None)
+            header = _header(rows, set(self.settings.columns.values()))
             if header is None:
                 return
             names = [name.strip().lstrip("\ufeff") for name in header.cells]
@@ -252,6 +273,8 @@ class _Reader:
             for row in delimited.even(rows, len(names), delimiter, complete=self.content.complete):
                 if isinstance(row, delimited.Unusable):
                     self._fault(row.line, "", str(row))
+                elif [cell.strip() for cell in row.cells] == names:
+                    self._remark(aqdef.Remark(row.line, "", "", "is the heading again; passed over"))
                 else:
                     yield row.line, dict(zip(names, row.cells, strict=False))
         except UnicodeError:
@@ -411,7 +434,7 @@ class _Reader:
         if remark.wrong:
             self._fault(remark.line, remark.field, f"{remark.value!r} {remark.reason}")
         else:
-            self.content.remarks.append(str(remark))
+            self.remarks.add(remark)
 
     # --- one reading
 
@@ -421,6 +444,10 @@ class _Reader:
         key = self.machine.characteristics.get(name)
         if key is None:
             self._nobody(line, name)
+            return
+        if str(fields.get("measured")).strip() in self.settings.missing:
+            self.content.skipped += 1
+            self._remark(aqdef.Remark(line, "", name, "is marked as missing; passed over"))
             return
         body: dict[str, Any] = {"characteristic": key}
         form = self.form if scale is None else self.form._replace(scale=scale)

@@ -117,10 +117,10 @@ def _tell(found: "list[Content]", chosen: dict[int, str], encoding: str) -> None
 
 
 def _sum_up(outcome: "Outcome", *, dry_run: bool) -> None:
+    for each in sorted(outcome.results, key=lambda each: each.trouble is None):  # the reason of a refusal first
+        _result(each, dry_run=dry_run)
     for remark in outcome.remarks:
         say(remark, style="yellow")
-    for each in outcome.results:
-        _result(each, dry_run=dry_run)
     if not any(each.trouble for each in outcome.results):
         say(_("They are history: no correction, no alarm, and the running average stays as it was."))
 

@@ -67,13 +67,18 @@ Mapping = Annotated[
     typer.Option(
         "--map",
         envvar="INBAND_MAP",
-        help="Which column is what: measured=Wert,measured_at=Datum+Uhrzeit. A column is named, or numbered from 1. "
+        help="Which column is what: measured=Wert,measured_at=Datum+Uhrzeit. A column is named, or numbered from 1; measured_at= says that none is. "
         "Of AQDEF, which characteristic is which: D40=shaft-d40; D41=+ sets it up.",
         show_default="by their names, in five languages",
     ),
 ]
 Delimiter = Annotated[
-    str | None, typer.Option(envvar="INBAND_DELIMITER", help="Column separator.", show_default="automatic")
+    str | None,
+    typer.Option(
+        envvar="INBAND_DELIMITER",
+        help="Column separator: a sign, tab, or blanks for two and more.",
+        show_default="automatic",
+    ),
 ]
 Decimal = Annotated[
     str | None, typer.Option(envvar="INBAND_DECIMAL", help="Point or comma in numbers.", show_default="automatic")
@@ -102,6 +107,17 @@ FirstLine = Annotated[
     int | None,
     typer.Option(
         envvar="INBAND_FIRST_LINE", min=2, help="First line of readings.", show_default="below the column names"
+    ),
+]
+LastLine = Annotated[
+    int | None,
+    typer.Option(envvar="INBAND_LAST_LINE", min=2, help="Last line of readings: below stand means or sums."),
+]
+Missing = Annotated[
+    str,
+    typer.Option(
+        envvar="INBAND_MISSING",
+        help="Marks of missing sizes, parted by commas: '---,n.i.O.,NaN'. * is every cell without a digit, an empty one too.",
     ),
 ]
 Sheet = Annotated[
@@ -143,6 +159,8 @@ def import_file(
     encoding: Encoding = None,
     header_line: HeaderLine = None,
     first_line: FirstLine = None,
+    last_line: LastLine = None,
+    missing: Missing = "",
     create_missing: Annotated[
         bool,
         typer.Option("--create-missing", envvar="INBAND_CREATE_MISSING", help="Of AQDEF: set up what is not here yet."),
@@ -183,6 +201,8 @@ def import_file(
         wishes_of(mapping, delimiter, decimal, unit, timezone, time_format, encoding),
         header_line=header_line,
         first_line=first_line,
+        last_line=last_line,
+        missing=frozenset(mark.strip() for mark in missing.split(",") if mark.strip()),
     )
     actor = f"command line ({getpass.getuser()})"
     with (
@@ -319,12 +339,13 @@ def wishes_of(
     time_format: str | None,
     encoding: str | None,
 ) -> "Wishes":
+    from app.files.formats.delimited import BLANKS
     from app.loop.readings.importing.layout import Wishes
 
     pairs = [pair.partition("=") for pair in mapping.split(",") if pair.strip()]
     if any(not name.strip() or not sign for name, sign, _column in pairs):
         raise typer.BadParameter("write it as measured=COLUMN,measured_at=COLUMN", param_hint="--map")
-    sign = {"tab": "\t", "\\t": "\t", "comma": ",", "semicolon": ";"}
+    sign = {"tab": "\t", "\\t": "\t", "comma": ",", "semicolon": ";", "blanks": BLANKS}
     return Wishes(
         mapping={name.strip(): column.strip() for name, _sign, column in pairs},
         delimiter=sign.get(delimiter or "", delimiter),
@@ -359,7 +380,8 @@ def _bar(file: Path) -> Iterator[Any]:
 
 
 def report(refusal: "Flawed", *, stored: bool = True) -> None:
-    """Every line with what is wrong with it; where line after line is wrong in the same way, the first ones and how far."""
+    """Say how many lines are wrong, then each with its reason; where line after line is wrong in one way, the first and how far."""
+    say(refusal.detail, style="bold red")
     for column, reason, flaws in _alike(refusal.flaws):
         listed = flaws if len(flaws) <= ALIKE + 1 else flaws[:ALIKE]
         for flaw in listed:
@@ -370,7 +392,8 @@ def report(refusal: "Flawed", *, stored: bool = True) -> None:
     more = refusal.count - len(refusal.flaws)
     if more > 0:
         say(_("… and {more} more.").format(more=more))
-    say(f"{refusal.detail} {refusal.what_to_do if stored else ''}", style="bold red")
+    if stored and refusal.what_to_do:
+        say(refusal.what_to_do, style="bold red")
 
 
 def _alike(flaws: "Iterable[Flaw]") -> "Iterator[tuple[str, str, list[Flaw]]]":
@@ -397,6 +420,8 @@ def _sum_up(summary: "Summary", characteristic: str, *, live: bool, dry_run: boo
     numbers = None if summary.first_sequence is None else (summary.first_sequence, summary.last_sequence)
     span = (summary.first_at, summary.last_at) if summary.first_at is not None and summary.last_at is not None else None
     say(f"{begin}{text}{_which(numbers, span)}.", style="bold")
+    for note in summary.notes:
+        say(note, style="yellow")
     if summary.repeated:
         say(_("{count} were stored before and are not stored again.").format(count=summary.repeated))
     if summary.zones:

@@ -10,6 +10,8 @@ from typing import NamedTuple, TextIO
 from app.language.i18n import _
 
 DELIMITERS = (";", "\t", ",", "|")
+BLANKS = "  "
+"""In place of a sign: two blanks or more part the cells, as printed tables have it. An empty cell cannot be seen there."""
 ENCODINGS = (
     "utf-8",
     "utf-8-sig",
@@ -167,6 +169,9 @@ def even(rows: Iterable[Row], width: int, delimiter: str, *, complete: bool = Tr
 
 
 def _even(row: Row, width: int, delimiter: str) -> Row | Unusable:
+    if delimiter == BLANKS and len(row.cells) != width:
+        words = _("has {cells} cells between blanks, the header has {width}: nobody can tell which of them is empty")
+        return Unusable(words.format(cells=len(row.cells), width=width), row.line)
     if any(cell.strip() for cell in row.cells[width:]):
         return Unusable(_too_wide(len(row.cells), width, delimiter), row.line)
     return Row(row.line, row.cells[:width] + [""] * (width - len(row.cells)))
@@ -207,6 +212,11 @@ def _is_number(cell: str) -> bool:
 
 def _rows(path: Path, encoding: str, delimiter: str) -> Iterator[Row]:
     with open_text(path, encoding) as file:
+        if delimiter == BLANKS:
+            for line, text in enumerate(_decoded(file, encoding), 1):
+                if text.strip():
+                    yield Row(line, re.split(r" *\t *| {2,}", text.strip()))
+            return
         reader = csv.reader(_decoded(file, encoding), delimiter=delimiter, strict=True)
         while True:
             line = reader.line_num + 1

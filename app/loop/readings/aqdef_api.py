@@ -14,6 +14,7 @@ from app.files.formats import cell_values
 from app.files.formats.aqdef import Source
 from app.files.formats.aqdef_times import day_order
 from app.files.formats.cell_values import Unreadable
+from app.files.formats.repeats import once
 from app.files.formats.units import Unit
 from app.language.i18n import _
 from app.language.times import plant_zone
@@ -154,7 +155,7 @@ def import_aqdef(request: Request, session: SessionDep, caller: Engineer, given:
         with database.sessions() as looking:
             chosen = _chosen(actions.guess(looking, found), given, found)
             machine = actions.machine_for(looking, found, given.machine)
-        outcome = Outcome(remarks=[str(each) for each in description.remarks])
+        outcome = Outcome(remarks=once(description.remarks))
         if chosen or not given.dry_run:
             outcome = actions.import_aqdef(
                 database,

@@ -140,7 +140,7 @@ def _values(session: Session, of: _Of, *, period: Period, last: int | None) -> I
             operator=context.get("operator") or "",
             machine=context.get("machine") or machine.key,
             gauge=context.get("gauge") or machine.key,
-            process=(context.get("process") or {}) | _process(row, offsets),
+            process=_process(context.get("process") or {}, row, offsets),
             comment=context.get("comment") or "",
             fields={name: text for name, text in kept.items() if name not in OF_THE_READING}
             | {GUID: guid_of(row["sequence"], row["received_at"])},
@@ -165,8 +165,8 @@ def _events(row: dict[str, Any], *, changed: bool) -> list[str]:
     return [*events, EXCLUDED] if row["excluded"] is not None else events
 
 
-def _process(row: dict[str, Any], offsets: dict[int, float]) -> dict[str, float]:
-    process: dict[str, float] = {}
+def _process(as_it_came: dict[str, float], row: dict[str, Any], offsets: dict[int, float]) -> dict[str, float]:
+    process = {name: value for name, value in as_it_came.items() if name != EMPIRICAL}
     number = row["correction_in_effect"]
     if number is not None:
         process[NUMBER] = float(number)

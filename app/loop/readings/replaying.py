@@ -13,7 +13,7 @@ from app.core.decision.step import Code
 from app.core.parameters import Parameters
 from app.errors import InbandError
 from app.loop.readings.answers import answer
-from app.loop.readings.importing.cells import Flaw
+from app.loop.readings.importing.cells import Flaw, Passed
 from app.loop.readings.importing.lines import Line
 from app.loop.readings.records import Entry
 from app.loop.readings.writer.decide import decide_reading
@@ -22,7 +22,7 @@ from app.loop.readings.writer.snapshot import LoadedAverage, LoadedStream, Loade
 
 
 def replay(
-    parameters: Parameters, lines: Iterable[Line | Flaw], characteristic: str
+    parameters: Parameters, lines: Iterable[Line | Flaw | Passed], characteristic: str
 ) -> Iterator[dict[str, Any] | Flaw]:
     """The answer to each line, as the API would give it; a line that cannot be read is passed on."""
     entry = Entry(0, "replay", 0, characteristic)
@@ -38,6 +38,8 @@ def replay(
     tool = stream.tool
     now = datetime.now(UTC)
     for line in lines:
+        if isinstance(line, Passed):
+            continue
         if isinstance(line, Flaw):
             yield line
             continue

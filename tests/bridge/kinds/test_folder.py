@@ -80,6 +80,17 @@ def test_cells_missing_or_left_over_at_the_end_are_empty(tmp_path: Path) -> None
     assert [len(content.faults), len(content.entries)] == [0, 3]
 
 
+def test_tables_that_people_print_are_read(tmp_path: Path) -> None:
+    text = "Plate: T-7\n\n  feature    actual\n      D40   40.0123\n      D40       ---\n  feature    actual\n      D40   40.0124\n"
+    columns = {"characteristic": "feature", "measured": "actual"}
+    content = read(tmp_path, text, columns=columns, decimal=".", delimiter="blanks", missing=["---"])
+    assert (content.faults, [each.body["measured"] for each in content.entries]) == ([], [40.0123, 40.0124])
+    assert content.remarks == [
+        "line 5: 'D40' is marked as missing; passed over",
+        "line 6: is the heading again; passed over",
+    ]
+
+
 def test_values_of_aqdef_that_are_empty_are_not_called_marked(tmp_path: Path) -> None:
     rows = [f"{F}0{F}23.11.2026/06:05:00", f"40.001{F}255{F}23.11.2026/06:06:00", f"40.002{F}0{F}23.11.2026/06:07:00"]
     text = "\n".join(["K0100 1", "K2001/1 D40", "K2142/1 mm", *rows, ""])

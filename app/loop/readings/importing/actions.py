@@ -8,7 +8,7 @@ from app.db.engine import Database
 from app.errors import Conflict, Invalid, NotFound
 from app.language.i18n import _
 from app.loop.readings import queries
-from app.loop.readings.importing.cells import MOST_FLAWS, Flaw
+from app.loop.readings.importing.cells import MOST_FLAWS, Flaw, Passed
 from app.loop.readings.importing.history import Flawed, Progress, Summary, store_history
 from app.loop.readings.importing.layout import Layout
 from app.loop.readings.importing.lines import Line, Read, lines
@@ -59,7 +59,7 @@ def import_readings(
 
 
 def _store_live(
-    database: Database, entry: Entry, parsed_lines: Iterable[Line | Flaw], *, dry_run: bool, progress: Progress
+    database: Database, entry: Entry, parsed_lines: Iterable[Line | Flaw | Passed], *, dry_run: bool, progress: Progress
 ) -> Summary:
     wanted, numbers = _all_good(parsed_lines, progress)
     summary = Summary(lines=len(wanted))
@@ -87,13 +87,15 @@ def _store_live(
     return summary
 
 
-def _all_good(parsed_lines: Iterable[Line | Flaw], progress: Progress) -> tuple[list[ReadingIn], list[int]]:
+def _all_good(parsed_lines: Iterable[Line | Flaw | Passed], progress: Progress) -> tuple[list[ReadingIn], list[int]]:
     wanted: list[ReadingIn] = []
     numbers: list[int] = []
     flaws: list[Flaw] = []
     wrong = 0
     for line in parsed_lines:
         progress()
+        if isinstance(line, Passed):
+            continue
         if isinstance(line, Flaw):
             wrong += 1
             flaws += [line] if wrong <= MOST_FLAWS else []

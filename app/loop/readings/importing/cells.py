@@ -18,7 +18,7 @@ from app.files.formats.cell_values import Unreadable
 from app.files.formats.delimited import Row, Unusable
 from app.files.formats.units import LENGTHS
 from app.language.i18n import _
-from app.loop.readings.importing.layout import ORIGIN, Layout, Wishes, look, rows_of
+from app.loop.readings.importing.layout import NO_DIGIT, ORIGIN, Layout, Wishes, look, rows_of
 from app.loop.readings.origin import Origin
 
 MOST_FLAWS = 200
@@ -41,12 +41,19 @@ class Flaw(NamedTuple):
         return f"{where}: {f'{self.value!r} ' if self.value else ''}{self.reason}"
 
 
+class Passed(NamedTuple):
+    """A line that is no reading and no error either, and why."""
+
+    line: int
+    reason: str
+
+
 class Item(NamedTuple):
     """The fields of a reading. place: of its layout among those that are asked for. number: of its line."""
 
     place: int
     number: int
-    fields: "dict[str, Any] | Flaw"
+    fields: "dict[str, Any] | Flaw | Passed"
 
 
 class Looked(NamedTuple):
@@ -96,7 +103,7 @@ def _write(waiting: dict[int, list[tuple[int, Any]]], folder: Path, spend: Calla
     waiting.clear()
 
 
-def taken(path: Path) -> Iterator[tuple[int, "dict[str, Any] | Flaw"]]:
+def taken(path: Path) -> Iterator[tuple[int, "dict[str, Any] | Flaw | Passed"]]:
     """The items of one layout that were put down, by the numbers of their lines."""
     if not path.exists():
         return
@@ -151,6 +158,10 @@ def _csv(path: Path, layouts: Sequence[Layout]) -> Iterator[Item]:
                 flaw = Flaw(row.line or 0, "", "", str(row))
                 yield from (Item(place, flaw.line, flaw) for place in range(len(layouts)))
                 continue
+            if tuple(cell.strip() for cell in row.cells) == layouts[0].header:
+                passed = Passed(row.line, _("is the heading again"))
+                yield from (Item(place, row.line, passed) for place in range(len(layouts)))
+                continue
             for place, own in enumerate(layouts):
                 yield from (Item(place, row.line, found) for found in _of_row(row, own, readers[place]))
     except Unusable as error:
@@ -158,8 +169,12 @@ def _csv(path: Path, layouts: Sequence[Layout]) -> Iterator[Item]:
         yield from (Item(place, line, Flaw(line, "", "", str(error))) for place in range(len(layouts)))
 
 
-def _of_row(row: Row, layout: Layout, readers: Sequence["_Reader"]) -> Iterator["dict[str, Any] | Flaw"]:
-    if layout.skips_blank and not any(row.cells[place].strip() for place in layout.columns["measured"]):
+def _of_row(row: Row, layout: Layout, readers: Sequence["_Reader"]) -> Iterator["dict[str, Any] | Flaw | Passed"]:
+    size = " ".join(row.cells[place] for place in layout.columns.get("measured", ())).strip()
+    if layout.skips_blank and not size:
+        return
+    if layout.missing and _is_missing(size, layout):
+        yield Passed(row.line, _("has no size: its mark says that it is missing"))
         return
     values: dict[str, Any] = {}
     flawed = False
@@ -185,6 +200,12 @@ def _with_origin(values: dict[str, Any]) -> dict[str, Any]:
     return values
 
 
+def _is_missing(size: str, layout: Layout) -> bool:
+    if size == spreadsheet.NO_RESULT:  # nobody knows what it would be
+        return False
+    return size in layout.missing or (NO_DIGIT in layout.missing and not any(map(str.isdigit, size)))
+
+
 _Reader = tuple[str, tuple[int, ...], Callable[[str], Any]]
 
 
@@ -202,7 +223,9 @@ def _readers(layout: Layout) -> list[_Reader]:
     scale, decimal, zone, pattern = LENGTHS[layout.unit], layout.decimal, layout.zone, layout.time_format
 
     def length(text: str) -> float:
-        value = cell_values.number(text, decimal)
+        # Numbers of a workbook have no decimal sign: a text with a comma among them can be read in one way only.
+        comma = layout.kind == "sheet" and "," in text and "." not in text
+        value = cell_values.number(text, "," if comma else decimal)
         return value if scale == 1.0 else round(value * scale, 9)
 
     def time(text: str) -> datetime:

@@ -23,11 +23,12 @@ from app.core.probing import TouchError, measured_value
 from app.core.variants import Results, results_of
 from app.db.events import publish
 from app.errors import Conflict, FieldError, Invalid
+from app.files.formats.repeats import lines_of
 from app.language.i18n import _
 from app.loop.characteristics import queries as characteristics
 from app.loop.characteristics.queries import CurrentCharacteristic
 from app.loop.machines import queries as machines
-from app.loop.readings.importing.cells import MOST_FLAWS, Flaw
+from app.loop.readings.importing.cells import MOST_FLAWS, Flaw, Passed
 from app.loop.readings.importing.lines import Line
 from app.loop.readings.origin import SAME
 from app.loop.readings.records import Entry
@@ -153,6 +154,15 @@ class Summary:
     last_at: datetime | None = None
     first_sequence: int | None = None
     last_sequence: int | None = None
+    passed: dict[str, list[int]] = field(default_factory=dict)
+
+    @property
+    def notes(self) -> list[str]:
+        """Sentences on lines that were passed over."""
+        return [
+            _("{lines}: {reason}; passed over.").format(lines=lines_of(each), reason=why)
+            for why, each in self.passed.items()
+        ]
 
 
 @dataclass
@@ -201,7 +211,13 @@ class _Judge:
 
 
 def store_history(
-    session: Session, entry: Entry, lines: Iterable[Line | Flaw], *, actor: str, source: str, progress: Progress
+    session: Session,
+    entry: Entry,
+    lines: Iterable[Line | Flaw | Passed],
+    *,
+    actor: str,
+    source: str,
+    progress: Progress,
 ) -> Summary:
     """Judge and store them; the caller commits, or looks only and rolls back.
 
@@ -250,13 +266,16 @@ def _driver(session: Session) -> Connection[Any]:
     return conn
 
 
-def _stage(cursor: Cursor[Any], lines: Iterable[Line | Flaw], judge: _Judge, progress: Progress) -> Summary:
+def _stage(cursor: Cursor[Any], lines: Iterable[Line | Flaw | Passed], judge: _Judge, progress: Progress) -> Summary:
     summary = Summary()
     flaws: list[Flaw] = []
     wrong = 0
     with cursor.copy(COPY) as copy:
         for line in lines:
             progress()
+            if isinstance(line, Passed):
+                summary.passed.setdefault(line.reason, []).append(line.line)
+                continue
             row = judge.row(line) if isinstance(line, Line) else line
             if isinstance(row, Flaw):
                 wrong += 1

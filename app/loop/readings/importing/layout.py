@@ -1,6 +1,7 @@
 """Meanings of the columns of a file: by the names that people give them in English, German, Serbian, Slovene and Russian."""
 
 import json
+import sys
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import accumulate, chain, islice
@@ -48,6 +49,7 @@ MOST_COLUMNS = 500
 TOP = 50  # rows in which the header is looked for
 ORIGIN = COLUMNS[:2]
 """Fields that are no choice of a person: they are there in what Inband wrote."""
+NO_DIGIT = "*"
 DATES = {"date", "datum", "дата", "датум"}
 TIMES = {"time", "zeit", "uhrzeit", "vreme", "cas", "время", "време"}
 
@@ -65,6 +67,8 @@ class Wishes:
     encoding: str | None = None
     header_line: int | None = None
     first_line: int | None = None  # of readings
+    last_line: int | None = None
+    missing: frozenset[str] = frozenset()  # marks in place of a size that is missing; NO_DIGIT for all without a digit
 
 
 @dataclass(frozen=True)
@@ -82,6 +86,8 @@ class Layout:
     time_format: str | None = None
     header_line: int = 1
     first_line: int = 2  # from here on lines are readings
+    last_line: int | None = None  # below are sums and means
+    missing: frozenset[str] = frozenset()
     skips_blank: bool = False  # a row without the measured value says nothing: another column of a wide sheet has one
 
     @property
@@ -126,8 +132,11 @@ def look(path: Path, wishes: Wishes, name: str | None = None, *, complete: bool 
         raise wrong("decimal", _("Decimals are written with a point or a comma."))
     if wishes.encoding not in {None, *delimited.ENCODINGS}:
         raise wrong("encoding", _("Choose one of {names}.").format(names=", ".join(delimited.ENCODINGS)))
-    if wishes.delimiter is not None and (len(wishes.delimiter) != 1 or wishes.delimiter in '"\r\n'):
-        raise wrong("delimiter", _("The column separator is one sign, such as ; or a tabulator."))
+    sign = wishes.delimiter
+    if sign not in {None, delimited.BLANKS} and (len(sign or "") != 1 or sign in {'"', "\r", "\n"}):
+        raise wrong(
+            "delimiter", _("The column separator is one sign, such as ; or a tabulator, or “blanks” for several.")
+        )
     ending = Path(name or path.name).suffix.lower()
     try:
         if ending in {".ndjson", ".jsonl", ".json"}:
@@ -151,7 +160,7 @@ def refuse_incomplete(layout: Layout) -> None:
             "measured",
             _(
                 "No column is recognised as the measured value. Say which it is: measured=COLUMN. The columns are: {header}."
-            ).format(header=", ".join(layout.header)),
+            ).format(header=", ".join(filter(None, layout.header))),
         )
 
 
@@ -213,16 +222,21 @@ def _csv_layout(path: Path, wishes: Wishes, zone: ZoneInfo | None, kind: str = "
         time_format=wishes.time_format,
         header_line=head,
         first_line=first_line,
+        last_line=wishes.last_line,
+        missing=wishes.missing,
     )
 
 
 def rows_of(path: Path, layout: Layout) -> Iterator[Row | Unusable]:
     """The rows of readings, each as wide as the header, or what is wrong with one."""
     width = len(layout.header)
-    rows = (row for row in delimited.rows(path, layout.encoding, layout.delimiter) if row.line >= layout.first_line)
+    last = layout.last_line or sys.maxsize
+    every = delimited.rows(path, layout.encoding, layout.delimiter)
+    rows = (row for row in every if layout.first_line <= row.line <= last)
     if layout.kind == "sheet":  # what stands beside the table is no part of it
         return (_as_wide(row, width) for row in rows)
-    return delimited.even(rows, width, layout.delimiter, complete=delimited.is_complete(path))
+    complete = layout.last_line is not None or delimited.is_complete(path)
+    return delimited.even(rows, width, layout.delimiter, complete=complete)
 
 
 def _as_wide(row: Row, width: int) -> Row:

@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 from app.errors import Invalid
 from app.files.apart import PREFIX, apart, spend
 from app.files.formats.delimited import Unusable
-from app.loop.readings.importing.cells import Flaw, Looked, fingerprint, items, looked, put_down, shown, taken
+from app.loop.readings.importing.cells import Flaw, Looked, Passed, fingerprint, items, looked, put_down, shown, taken
 from app.loop.readings.importing.layout import Layout, Wishes, wrong
 from app.loop.readings.origin import Origin, guid_of
 from app.loop.readings.schemas import ReadingIn, reading_of
@@ -24,11 +24,13 @@ class Line(NamedTuple):
     origin: Origin | None = None
 
 
-Read = Callable[[int, str], Iterator[Line | Flaw]]
+Read = Callable[[int, str], Iterator[Line | Flaw | Passed]]
 """The lines of a file by the place of a layout, as readings of a characteristic."""
 
 
-def lines(path: Path, layout: Layout, characteristic: str, *, now: datetime | None = None) -> Iterator[Line | Flaw]:
+def lines(
+    path: Path, layout: Layout, characteristic: str, *, now: datetime | None = None
+) -> Iterator[Line | Flaw | Passed]:
     """Every line that is not empty. A reading without a key of its own gets one made of the file's content and the line,
     so that importing the same file again stores nothing twice.
     """
@@ -63,10 +65,14 @@ def read_apart(path: Path, layouts: Sequence[Layout], most: int | None = None) -
 
 
 def _readings(
-    found: Iterable[tuple[int, dict[str, Any] | Flaw]], layout: Layout, characteristic: str, mark: str, now: datetime
-) -> Iterator[Line | Flaw]:
+    found: Iterable[tuple[int, dict[str, Any] | Flaw | Passed]],
+    layout: Layout,
+    characteristic: str,
+    mark: str,
+    now: datetime,
+) -> Iterator[Line | Flaw | Passed]:
     for number, item in found:
-        if isinstance(item, Flaw):
+        if isinstance(item, Flaw | Passed):
             yield item
             continue
         item["characteristic"] = characteristic

@@ -20,7 +20,7 @@ from app.loop.readings.importing import uploads, wide
 from app.loop.readings.importing.actions import import_readings
 from app.loop.readings.importing.aqdef import form as aqdef_form
 from app.loop.readings.importing.history import Flawed
-from app.loop.readings.importing.layout import NAMES, Layout, Wishes, refuse_incomplete
+from app.loop.readings.importing.layout import NAMES, NO_DIGIT, Layout, Wishes, refuse_incomplete
 from app.loop.readings.importing.lines import look_apart, read_apart
 from app.loop.readings.importing.preview import TRIED_WHOLE, Preview, PreviewLine, first_lines, preview
 from app.loop.readings.importing.uploads import Upload
@@ -32,8 +32,11 @@ from app.web.templates import page
 
 router = APIRouter(include_in_schema=False)
 Token = Annotated[str, Path(max_length=64)]
-HOW = ("timezone", "unit", "decimal", "delimiter", "encoding", "header_line", "first_line", "time_format", "sheet")
-SIGNS = {"tab": "\t", "comma": ",", "semicolon": ";", "bar": "|"}
+HOW = (
+    "timezone", "unit", "decimal", "delimiter", "encoding", "header_line", "first_line", "last_line", "missing", "time_format",
+    "sheet",
+)  # fmt: skip
+SIGNS = {"tab": "\t", "comma": ",", "semicolon": ";", "bar": "|", "blanks": delimited.BLANKS}
 
 
 @router.get("/import", dependencies=[require("engineer")])
@@ -248,6 +251,8 @@ def _wishes(said: Mapping[str, str]) -> Wishes:
         encoding=said.get("encoding") or None,
         header_line=_line(said.get("header_line", "")),
         first_line=_line(said.get("first_line", "")),
+        last_line=_line(said.get("last_line", "")),
+        missing=frozenset({NO_DIGIT} if said.get("missing") else ()),
     )
 
 

@@ -7,7 +7,7 @@ from typing import NamedTuple
 from app.db.engine import Database
 from app.errors import InbandError
 from app.loop.readings.importing.actions import import_readings
-from app.loop.readings.importing.cells import MOST_FLAWS, Flaw, Looked
+from app.loop.readings.importing.cells import MOST_FLAWS, Flaw, Looked, Passed
 from app.loop.readings.importing.history import Flawed, Summary
 from app.loop.readings.importing.lines import Line, read_apart
 
@@ -60,7 +60,7 @@ def first_lines(looked: Looked) -> list[PreviewLine]:
     return [PreviewLine(number, cells, None, []) for number, cells in looked.first]
 
 
-def _shown(first: Sequence[tuple[int, list[str]]], found: Iterator[Line | Flaw]) -> list[PreviewLine]:
+def _shown(first: Sequence[tuple[int, list[str]]], found: Iterator[Line | Flaw | Passed]) -> list[PreviewLine]:
     read: dict[int, Line] = {}
     flaws: dict[int, list[Flaw]] = {}
     last = max((number for number, _cells in first), default=0)
@@ -70,6 +70,6 @@ def _shown(first: Sequence[tuple[int, list[str]]], found: Iterator[Line | Flaw])
             break
         if isinstance(line, Line):
             read[number] = line
-        else:
+        elif isinstance(line, Flaw):
             flaws.setdefault(number, []).append(line)
     return [PreviewLine(number, cells, read.get(number), flaws.get(number, [])) for number, cells in first]

@@ -74,7 +74,8 @@ def test_import_names_every_bad_line_and_fails_with_1(plant: Database, tmp_path:
     assert done.returncode == 1
     assert "line 2, measured: 'about 40' is not a number" in done.stderr
     assert "line 3, measured_at: '2026-03-02 06:00' does not say in which time zone; name the time zone" in done.stderr
-    assert "2 things are wrong with the file. Nothing was imported." in done.stderr
+    said = done.stderr[done.stderr.index("2 things are wrong with the file.") :]
+    assert said.index("line 2, measured") < said.index("Nothing was imported."), "the reason first, what to do last"
     assert "Traceback" not in done.stderr
     assert count(plant) == 0
 

@@ -6,16 +6,19 @@ from datetime import UTC, datetime
 from pathlib import Path
 
 import pytest
+from openpyxl import Workbook
 
 from app.errors import Invalid
-from app.loop.readings.importing.cells import Flaw
-from app.loop.readings.importing.layout import MOST_COLUMNS, Wishes, look
+from app.files.formats.delimited import BLANKS
+from app.files.formats.spreadsheet import text_of
+from app.loop.readings.importing.cells import Flaw, Passed
+from app.loop.readings.importing.layout import MOST_COLUMNS, NO_DIGIT, Wishes, look
 from app.loop.readings.importing.lines import Line, lines
 
 NOW = datetime(2026, 11, 21, 12, tzinfo=UTC)
 
 
-def read(path: Path, **wishes: object) -> list[Line | Flaw]:
+def read(path: Path, **wishes: object) -> list[Line | Flaw | Passed]:
     return list(lines(path, look(path, Wishes(**wishes)), "shaft-d40", now=NOW))  # type: ignore[arg-type]
 
 
@@ -282,3 +285,48 @@ def test_times_as_counts_are_read_where_somebody_says_of_what(tmp_path: Path) ->
     (line,) = read(path, time_format="seconds since 1970-01-01")
     assert isinstance(line, Line)
     assert line.reading.measured_at == datetime.fromtimestamp(1795245300, UTC)
+
+
+def passed(path: Path, **wishes: object) -> list[str]:
+    return [f"{each.line}: {each.reason}" for each in read(path, **wishes) if isinstance(each, Passed)]
+
+
+MARKS = "measured;part\n40,001;a\n---;b\nn.i.O.;c\n;d\n40,002;e\n"
+
+
+def test_marks_of_missing_sizes_are_passed_over_once_they_are_named(tmp_path: Path) -> None:
+    path, every = write(tmp_path, MARKS), frozenset({NO_DIGIT})
+    assert [each.line for each in read(path) if isinstance(each, Flaw)] == [3, 4, 5]
+    assert good(path, missing=every) == [(40.001, "a"), (40.002, "e")]
+    assert [each[:2] for each in passed(path, missing=every)] == ["3:", "4:", "5:"]
+    assert [each.line for each in read(path, missing=frozenset({"---"})) if isinstance(each, Flaw)] == [4, 5]
+
+
+def test_headings_again_are_passed_over_and_footers_cut_off_where_the_last_line_is_said(tmp_path: Path) -> None:
+    path = write(tmp_path, "measured;part\n40,001;a\nmeasured;part\n40,002;b\n\nMean;40,0015\nCpk;1,45\n")
+    assert [each.line for each in read(path) if isinstance(each, Flaw)] == [6, 7]
+    assert good(path, last_line=4) == [(40.001, "a"), (40.002, "b")]
+    assert passed(path, last_line=4) == ["3: is the heading again"]
+
+
+TABLE = "Plate: T-7\n\n   Meas X    Meas Y  Meas D\n  -80.754  -215.282   2.176\n  -40.120  -115.205   2.171\n    1.000     2.000\n"
+
+
+def test_columns_aligned_by_blanks_are_read_and_nothing_is_shifted(tmp_path: Path) -> None:
+    found = read(write(tmp_path, TABLE), delimiter=BLANKS, mapping={"measured": "Meas D"})
+    assert [each.reading.measured for each in found if isinstance(each, Line)] == [2.176, 2.171]
+    assert [str(each) for each in found if isinstance(each, Flaw)] == [
+        "line 6: has 2 cells between blanks, the header has 3: nobody can tell which of them is empty"
+    ]
+
+
+def test_a_text_among_the_numbers_of_a_workbook_is_read_in_the_one_way_it_can_be(tmp_path: Path) -> None:
+    book = Workbook()
+    assert book.active is not None
+    for row in (["measured", "part"], [40.001, "a"], ["40,002", "b"], ["1.040,003", "c"]):
+        book.active.append(row)
+    book.save(tmp_path / "a.xlsx")
+    with text_of(tmp_path / "a.xlsx", None) as path:
+        found = list(lines(path, look(path, Wishes(), "a.xlsx"), "shaft-d40", now=NOW))
+    assert [each.reading.measured for each in found if isinstance(each, Line)] == [40.001, 40.002]
+    assert [each.line for each in found if isinstance(each, Flaw)] == [4]

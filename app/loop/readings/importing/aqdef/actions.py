@@ -16,6 +16,7 @@ from app.files.apart import apart
 from app.files.formats.aqdef import Description, Source
 from app.files.formats.cell_values import folded
 from app.files.formats.delimited import Unusable
+from app.files.formats.repeats import once
 from app.language.i18n import _, ngettext
 from app.loop.characteristics import actions as characteristics
 from app.loop.characteristics import queries as characteristic_queries
@@ -154,7 +155,7 @@ def import_aqdef(
                     "file",
                     _("it holds no value of what is chosen; the values of a .dfd lie in the .dfx that belongs to it"),
                 )
-            outcome.remarks = [str(each) for each in description.remarks] + readings.sentences()
+            outcome.remarks = once(description.remarks) + readings.sentences()
             outcome.results = _store_all(session, readings, wanted, chosen, machine, actor, name)
             if dry_run:
                 session.rollback()

@@ -16,7 +16,6 @@ from app.loop.readings.importing.aqdef.matching import Content
 from app.loop.readings.importing.aqdef.sorting import Kept, Sorted, Wanted, Wishes, sort_out
 from app.loop.readings.importing.cells import Flaw
 from app.loop.readings.importing.lines import Line
-from app.loop.readings.origin import EMPIRICAL, Origin, named_by
 from app.loop.readings.schemas import reading_of
 
 
@@ -46,14 +45,14 @@ class Readings:
                     "context": kept.context,
                 }
                 try:
-                    yield Line(kept.line, reading_of(fields, now), _origin(kept))
+                    yield Line(kept.line, reading_of(fields, now), kept.origin)
                 except Invalid as refusal:
                     for error in refusal.errors:
                         yield Flaw(kept.line, f"{error.field}", "", error.message)
 
     def sentences(self) -> list[str]:
         """Sentences on the file that a person should know before it is imported."""
-        texts = [str(each) for each in self.found.remarks]
+        texts = self.found.remarks.sentences()
         if self.found.without_time:
             texts.append(
                 ngettext(
@@ -77,14 +76,6 @@ class Readings:
                 % {"num": missing}
             )
         return texts
-
-
-def _origin(kept: Kept) -> Origin | None:
-    """The origin of a value that Inband wrote: its size as it was measured, for the file has the corrected one."""
-    if (named := named_by(kept.guid)) is None:
-        return None
-    process = (kept.context or {}).get("process") or {}
-    return Origin(*named, kept.measured + process.get(EMPIRICAL, 0.0))
 
 
 @contextmanager

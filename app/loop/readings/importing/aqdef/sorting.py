@@ -20,9 +20,10 @@ from app.files.formats.aqdef_context import context_of
 from app.files.formats.aqdef_keys import Keys
 from app.files.formats.aqdef_times import DayOrder, Slashed, WallClock, slashed
 from app.files.formats.aqdef_values import Value
+from app.files.formats.repeats import Repeats
 from app.language.i18n import _
 from app.loop.readings.importing.cells import MOST_FLAWS, Flaw, fingerprint
-from app.loop.readings.origin import named_by
+from app.loop.readings.origin import EMPIRICAL, Origin, named_by
 
 AT_ONCE = 20_000  # readings in memory before they are put down
 
@@ -53,7 +54,7 @@ class Kept(msgspec.Struct, array_like=True):
     part: str
     key: str
     context: dict[str, Any] | None = None
-    guid: str = ""  # of a reading that Inband wrote
+    origin: Origin | None = None  # of a reading that Inband wrote
 
 
 @dataclass
@@ -67,7 +68,7 @@ class Sorted:
     month_first: str = ""  # a date with strokes that can only be read so
     flaws: list[Flaw] = field(default_factory=list)
     flaw_count: int = 0
-    remarks: list[Remark] = field(default_factory=list)
+    remarks: Repeats = field(default_factory=Repeats)
 
 
 def described(source: Source) -> Description:
@@ -157,8 +158,8 @@ class _Sorter:
             readings.flaw_count += 1
             if len(readings.flaws) < MOST_FLAWS:
                 readings.flaws.append(Flaw(*remark[:4]))
-        elif len(readings.remarks) < MOST_FLAWS:
-            readings.remarks.append(remark)
+        else:
+            readings.remarks.add(remark)
 
     def _kept(self, value: Value) -> Kept | None:
         readings, index, content = self._readings, value.characteristic, self._wanted[value.characteristic]
@@ -182,10 +183,11 @@ class _Sorter:
         if read.attribute:
             readings.excluded.setdefault(index, {}).setdefault(read.attribute, []).append(key)
         context = context_of(value, read, self._description, self._remark)
-        guid = value.fields.get("K0097", "")
-        if named_by(guid) is None:
-            guid = ""
-        else:  # of where the file comes from: this reading will have one of its own
-            further = {name: text for name, text in context.pop("fields").items() if name != "K0097"}
-            context |= {"fields": further} if further else {}
-        return Kept(value.line, measured, at, (read.part or read.batch)[:128], key, context or None, guid)
+        origin = None
+        if named := named_by(value.fields.get("K0097", "")):
+            origin = Origin(*named, measured + context.get("process", {}).get(EMPIRICAL, 0.0))
+            # They are of where the file comes from: this reading will have its own.
+            for name, own in (("fields", "K0097"), ("process", EMPIRICAL)):
+                further = {each: text for each, text in context.pop(name, {}).items() if each != own}
+                context |= {name: further} if further else {}
+        return Kept(value.line, measured, at, (read.part or read.batch)[:128], key, context or None, origin)

@@ -138,6 +138,15 @@ def test_fields_that_nobody_knows_are_remarked_on_once(plant: Database, tmp_path
     assert [remark for remark in outcome.remarks if "more fields than are known" in remark] == outcome.remarks[:1]
 
 
+def test_what_is_the_same_of_many_values_is_said_once(plant: Database, tmp_path: Path) -> None:
+    rows = [field for n in range(30) for field in (f"K0001/1 39.9{n:02}", f"K0099/1 {n}")]
+    outcome = run(plant, written(tmp_path / "a.dfq", [*SEAT, *rows]))
+    assert outcome.remarks[0] == (
+        "lines 5, 7, 9 and 27 more, K0099: '0' is no field that is known here; it is kept and not used"
+    )
+    assert len(outcome.remarks) == 2
+
+
 def test_history_before_2000_is_history(plant: Database, tmp_path: Path) -> None:
     outcome = run(plant, written(tmp_path / "a.dfq", [*SEAT, f"39.991{F}0{F}07.05.1992/13:43:21"]))
     assert outcome.stored == 1
