@@ -201,6 +201,7 @@ def explain(error: Exception) -> tuple[str | None, int]:
     from sqlalchemy.exc import OperationalError
 
     from app.db.binaries import BinariesError
+    from app.db.connections import held_up
     from app.db.embedded import EmbeddedServerError
     from app.db.migrate import MigrationError
 
@@ -217,6 +218,11 @@ def explain(error: Exception) -> tuple[str | None, int]:
             return "\n".join([error.detail, *fields, *([error.what_to_do] if error.what_to_do else [])]), 1
         case EmbeddedServerError() | BinariesError() | MigrationError():
             return str(error), 1
+        case OperationalError() | Away() if held_up(getattr(error, "orig", error)):
+            return (
+                "Other work holds what this command needs, and it could not wait any longer. Try again when that has ended.",
+                1,
+            )
         case OperationalError() | Away():
             return (
                 f"The database cannot be used: {str(getattr(error, 'orig', error)).strip()}\nIs INBAND_DATABASE_URL right, and the server up?",

@@ -34,7 +34,14 @@ LOOK = 0.1
 TRIFLE = "SELECT pg_postmaster_start_time()"
 """Needs no table, no lock and no disk, and tells a server from the one that has replaced it."""
 
+_HELD_UP = {"55P03", "57014", "40P01"}
+
 log = logging.getLogger(__name__)
+
+
+def held_up(error: BaseException | None) -> bool:
+    """Tell if a lock, the time of a statement or a deadlock has ended it: the database is there, other work holds what was wanted."""
+    return getattr(error, "sqlstate", None) in _HELD_UP
 
 
 def plain_url(url: str) -> str:

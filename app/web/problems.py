@@ -19,6 +19,7 @@ from starlette.responses import JSONResponse, RedirectResponse, Response
 from starlette.routing import Route
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
+from app.db.connections import held_up
 from app.errors import (
     PROBLEM_JSON,
     Busy,
@@ -48,8 +49,6 @@ FOR_PROGRAMS = ("/api/", "/health/", "/metrics")
 ALREADY_TAKEN = "23505"
 BAD_DATA = "22"
 NO_ROOM = "53100"
-WAITED_FOR_TOO_LONG = {"55P03", "57014", "40P01"}
-"""A lock, the time of a statement, a deadlock: the database is there, and other work holds what was wanted."""
 
 
 def is_for_programs(path: str) -> bool:
@@ -196,7 +195,7 @@ async def _database(request: Request, error: Exception) -> Response:
                 "Wait a moment, load the page or the list again, and see whether it was stored before you repeat it."
             )
             return answer(request, OutcomeUnknown(look), cause)
-        return answer(request, Busy() if state in WAITED_FOR_TOO_LONG else DatabaseAway(), cause)
+        return answer(request, Busy() if held_up(cause) else DatabaseAway(), cause)
     if state == ALREADY_TAKEN:
         return answer(
             request,

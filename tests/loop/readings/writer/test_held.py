@@ -10,6 +10,7 @@ import psycopg
 import pytest
 from starlette.requests import Request
 
+from app.cli.base import explain
 from app.db.connections import Connections
 from app.db.engine import Database
 from app.errors import Busy, OutcomeUnknown
@@ -221,9 +222,11 @@ def test_how_a_commit_ended_is_asked_until_the_patience_is_over(database: Databa
     assert isinstance(found, Verdict if heard else OutcomeUnknown)
 
 
-def test_a_request_of_a_person_that_waited_for_a_lock_is_not_told_of_an_absent_database() -> None:
+def test_nobody_who_waited_for_a_lock_is_told_of_an_absent_database() -> None:
     request = Request({"type": "http", "method": "POST", "path": "/api/v1/machines", "headers": [], "state": {}})
     for error in (psycopg.errors.LockNotAvailable("timeout"), psycopg.errors.QueryCanceled("timeout")):
         answer = run(unforeseen(request, error))
         assert answer.status_code == 503
         assert b"urn:inband:problem:busy" in bytes(answer.body)
+        assert "Other work holds what this command needs" in str(explain(error))
+    assert "Is INBAND_DATABASE_URL right" in str(explain(psycopg.OperationalError("no route to host")))
