@@ -7,6 +7,8 @@ from enum import StrEnum
 from functools import partial
 from typing import Any, NamedTuple
 
+from app.core.natural import NaturalLimit
+
 LARGEST_LENGTH = 100_000.0  # mm; no machine tool is a hundred metres long
 
 
@@ -83,6 +85,7 @@ ENUMS: dict[str, type[StrEnum]] = {
     "feature": Feature,
     "mode": Mode,
     "wear_policy": WearPolicy,
+    "natural_limit": NaturalLimit,
 }
 
 
@@ -137,6 +140,7 @@ FIELDS: tuple[Field, ...] = (
     Field("lower_deviation", "R41", FieldKind.LENGTH),
     Field("target", "R32", FieldKind.LENGTH),
     Field("tolerance_width", "R35", FieldKind.LENGTH, lowest=0),
+    Field("natural_limit", None, FieldKind.CHOICE, choices=_choices(NaturalLimit)),
     Field("zero_range", "R33", FieldKind.LENGTH, required=True, lowest=0, source_range=(0, 0.1)),
     Field("averaging_limit", "R34", FieldKind.LENGTH, lowest=0, source_range=(0, 0.1)),
     Field("wear_limit", "R37", FieldKind.LENGTH, required=True, lowest=0, source_range=(0.3, 3)),
@@ -161,9 +165,9 @@ class Problem(NamedTuple):
     """Something wrong with a parameter set: where, what (a code with values), and how bad.
 
     Codes: required, unknown, twice, not_a_number, not_whole, not_a_choice, not_yes_no, range, order, target_missing,
-    target_twice, tolerance_sign, sign_missing, factor_zero, accept, sections, tool_measured, contested, no_location, and the warnings source_range,
+    target_twice, tolerance_sign, sign_missing, factor_zero, accept, sections, tool_measured, contested, no_location, natural_corrected, and the warnings source_range,
     variant_axis, points_missing, not_on_lathe, factor_on_lathe, switch_value, switch_wins, switch_loses,
-    out_of_reach, spacing_missing, places_coincide, limits_as_sizes, averages_never, factor_of_tool.
+    out_of_reach, spacing_missing, places_coincide, limits_as_sizes, averages_never, factor_of_tool, natural_assumed.
     """
 
     field: str

@@ -15,6 +15,15 @@ from typing import Any
 from app.core.decision.limits import Limits, nanometres
 from app.core.decision.step import Rules
 from app.core.fits import with_fit
+from app.core.natural import (
+    NaturalLimit,
+    Tolerance,
+    assumed,
+    half_of,
+    half_width,
+    target_of,
+    tolerance_about_target,
+)
 from app.core.parameter_table import (
     AVERAGE_LOCATIONS,
     BY_NAME,
@@ -55,6 +64,7 @@ __all__ = [
     "FieldKind",
     "MachineType",
     "Mode",
+    "NaturalLimit",
     "ParameterError",
     "Parameters",
     "Problem",
@@ -64,6 +74,7 @@ __all__ = [
     "mean_nominal",
     "read",
     "unusual_calibration",
+    "unusual_natural",
     "unusual_on",
     "unusual_partly",
     "unusual_switch",
@@ -105,6 +116,7 @@ class Parameters:
     max_step: float | None = None
     max_total: float | None = None
     plausible_jump: float | None = None
+    natural_limit: NaturalLimit = NaturalLimit.NONE
 
     @cached_property
     def limits(self) -> Limits:
@@ -125,7 +137,25 @@ class Parameters:
             holds_wear=self.wear_policy is WearPolicy.HOLD,
             rejected_may_correct=self.rejected_may_correct,
             of_tool=self.feature is Feature.TOOL and not self.measures_only,
+            natural=self.natural_limit.side,
         )
+
+    @property
+    def half(self) -> float:
+        """Distance from the target to each limit that is judged, mm: R35/2, or R35 from a natural limit."""
+        return half_of(self)
+
+    @property
+    def tolerance(self) -> Tolerance:
+        """The limits that are judged, as deviations from the target; the natural one is None."""
+        return tolerance_about_target(self.half, self.natural_limit)
+
+    @property
+    def sizes(self) -> tuple[float, float]:
+        """Lower and upper limit of size, mm, a natural one included."""
+        below = 0.0 if self.natural_limit is NaturalLimit.LOWER else self.half
+        above = 0.0 if self.natural_limit is NaturalLimit.UPPER else self.half
+        return round(self.target - below, 9), round(self.target + above, 9)
 
     @property
     def measures_only(self) -> bool:
@@ -162,21 +192,23 @@ class ParameterError(ValueError):
         self.problems = problems
 
 
-def mean_nominal(nominal: float, upper_deviation: float, lower_deviation: float) -> tuple[float, float]:
-    """L75: target R32 = R42 + (R40 + R41)/2 and tolerance width R35 = R40 - R41, mm.
+def mean_nominal(
+    nominal: float, upper_deviation: float, lower_deviation: float, natural_limit: str | None = None
+) -> tuple[float, float]:
+    """L75: target R32 = R42 + (R40 + R41)/2 and tolerance width R35 = R40 - R41, mm; the target is a natural limit if there is one.
 
     >>> mean_nominal(10, 0, -0.004)
     (9.998, 0.004)
     """
     return (
-        round(nominal + (upper_deviation + lower_deviation) / 2, 9),
+        target_of(nominal, upper_deviation, lower_deviation, natural_limit),
         round(upper_deviation - lower_deviation, 9),
     )
 
 
-def default_averaging_limit(tolerance_width: float) -> float:
-    """R34 "2/3 of the tolerance", mm: two thirds of R35/2."""
-    return round(tolerance_width / 3, 9)
+def default_averaging_limit(tolerance_width: float, natural_limit: str | None = None) -> float:
+    """R34 "2/3 of the tolerance", mm: two thirds of R35/2, or of R35 from a natural limit."""
+    return round(half_width(tolerance_width, natural_limit) * 2 / 3, 9)
 
 
 def read(given: Mapping[str, Any]) -> tuple[Parameters, list[Problem]]:
@@ -198,10 +230,11 @@ def read(given: Mapping[str, Any]) -> tuple[Parameters, list[Problem]]:
     if _two_points(switch, problems):
         values["variant"] = Variant.TWO_POINT.value
     values["accept_n"], values["accept_m"] = _accept(accept, problems)
+    values.setdefault("natural_limit", assumed(values).value)
     _target(values, problems)
     if problems:
         raise ParameterError(problems)
-    values.setdefault("averaging_limit", default_averaging_limit(values["tolerance_width"]))
+    values.setdefault("averaging_limit", default_averaging_limit(values["tolerance_width"], values["natural_limit"]))
     if values["tool_memory"] != 0 and values["mode"] != Mode.MEASURE_ONLY and "factor" not in values:
         problems.append(Problem("factor", "sign_missing", {}))
     elif values.setdefault("factor", -1.0) == 0:
@@ -209,6 +242,7 @@ def read(given: Mapping[str, Any]) -> tuple[Parameters, list[Problem]]:
     problems.extend(_order(values))
     problems.extend(_sections(values))
     problems.extend(_tool_measured(values))
+    problems.extend(_natural(values))
     if problems:
         raise ParameterError(problems)
     for name, enum in ENUMS.items():
@@ -322,7 +356,9 @@ def _target(values: dict[str, Any], problems: list[Problem]) -> None:
         problems.extend(Problem(name, "required", {}) for name in missing)
         if missing or problems:
             return
-        target, width = mean_nominal(values["nominal"], values["upper_deviation"], values["lower_deviation"])
+        target, width = mean_nominal(
+            values["nominal"], values["upper_deviation"], values["lower_deviation"], values["natural_limit"]
+        )
         if width <= 0:
             problems.append(
                 Problem(
@@ -343,11 +379,12 @@ def _target(values: dict[str, Any], problems: list[Problem]) -> None:
 
 
 def _order(values: Mapping[str, Any]) -> Iterator[Problem]:
-    """R33 < R34 <= R35/2 <= R37 <= R36; every broken pair is named at its outer member."""
+    """R33 < R34 <= R35/2 <= R37 <= R36; every broken pair is named at its outer member. From a natural limit R35 counts whole."""
+    half = half_width(values["tolerance_width"], values["natural_limit"])
     chain = (
         ("zero_range", "R33", values["zero_range"]),
         ("averaging_limit", "R34", values["averaging_limit"]),
-        ("tolerance_width", "R35/2", values["tolerance_width"] / 2),
+        ("tolerance_width", "R35/2" if values["natural_limit"] == NaturalLimit.NONE else "R35", half),
         ("wear_limit", "R37", values["wear_limit"]),
         ("confidence_limit", "R36", values["confidence_limit"]),
     )
@@ -366,6 +403,21 @@ def _tool_measured(values: Mapping[str, Any]) -> Iterator[Problem]:
     """A tool that is measured itself belongs to a location."""
     if values["feature"] == Feature.TOOL and values["tool_memory"] == 0:
         yield Problem("tool_memory", "tool_measured", {})
+
+
+def _natural(values: Mapping[str, Any]) -> Iterator[Problem]:
+    """A size with a natural limit has no sign: no offset corrects it."""
+    if values["natural_limit"] != NaturalLimit.NONE and values["tool_memory"] and values["mode"] != Mode.MEASURE_ONLY:
+        yield Problem("mode", "natural_corrected", {})
+
+
+def unusual_natural(given: Mapping[str, Any], parameters: Parameters) -> list[Problem]:
+    """Warn of a natural limit that was not said but assumed. given: what was sent, by name or R number."""
+    said = any(raw == "natural_limit" and value is not None for raw, value in given.items())
+    sizes = {"R42", "R40", "R41", "NOMINAL", "UPPER_DEVIATION", "LOWER_DEVIATION"} & {raw.upper() for raw in given}
+    if said or not sizes or parameters.natural_limit is NaturalLimit.NONE:
+        return []
+    return [Problem("natural_limit", "natural_assumed", {"limit": parameters.target}, warning=True)]
 
 
 def unusual_partly(given: Mapping[str, Any]) -> list[Problem]:

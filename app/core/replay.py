@@ -38,6 +38,7 @@ from app.core.decision.loops import (
     follow_each,
 )
 from app.core.decision.step import DECIMALS
+from app.core.natural import Tolerance
 from app.core.parameters import Feature, Parameters
 
 LONGEST_DELAY = 200  # parts
@@ -171,7 +172,7 @@ def run(trace: ProcessTrace, policy: Policy) -> tuple[ReplayResult, Figures]:
     result = ReplayResult.room(len(trace.free))
     tally = np.zeros(1, TALLY)
     follow(trace, rows_of([policy])[0], policy.delay, result, tally[0])
-    return result, _figures(tally[0], _half(policy))
+    return result, _figures(tally[0], _tolerance(policy))
 
 
 def figures_of(trace: ProcessTrace, policies: Sequence[Policy]) -> list[Figures]:
@@ -180,7 +181,7 @@ def figures_of(trace: ProcessTrace, policies: Sequence[Policy]) -> list[Figures]
         return []
     tallies = np.zeros(len(policies), TALLY)
     follow_each(trace, rows_of(policies), policies[0].delay, ReplayResult.room(0), tallies)
-    return [_figures(tally, _half(policy)) for tally, policy in zip(tallies, policies, strict=True)]
+    return [_figures(tally, _tolerance(policy)) for tally, policy in zip(tallies, policies, strict=True)]
 
 
 def rows_of(policies: Sequence[Policy]) -> Rows:
@@ -188,12 +189,12 @@ def rows_of(policies: Sequence[Policy]) -> Rows:
     return np.array([[lane.row() for lane in policy.lanes] for policy in policies], LANE)
 
 
-def _half(policy: Policy) -> float:
-    """R35/2 of the lane that counts last: the newest version."""
-    return next(lane.parameters.tolerance_width for lane in reversed(policy.lanes) if lane.counts) / 2
+def _tolerance(policy: Policy) -> Tolerance:
+    """The limits of the lane that counts last: the newest version."""
+    return next(lane.parameters.tolerance for lane in reversed(policy.lanes) if lane.counts)
 
 
-def _figures(tally: Any, half: float) -> Figures:
+def _figures(tally: Any, tolerance: Tolerance) -> Figures:
     number = dict(zip(TALLY.names or (), tally.item(), strict=True))
     total, squares, largest, sizes = (number.pop(name) for name in ("sum", "squares", "largest", "sizes"))
     inner, corrections = number["inner"], number["corrections"]
@@ -204,7 +205,7 @@ def _figures(tally: Any, half: float) -> Figures:
         if not nanometres(spread * 1000):  # of equal readings rounding alone is left
             spread = 0.0
         elif inner >= FEWEST_FOR_PPK:
-            ppk = (half - abs(mean)) / (3 * spread)
+            ppk = tolerance.room(mean) / (3 * spread)
     return Figures(
         **number,
         mean_size=sizes / corrections if corrections else None,

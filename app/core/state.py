@@ -5,7 +5,8 @@ from dataclasses import dataclass
 from datetime import datetime, timedelta
 from enum import StrEnum
 
-from app.core.decision.limits import nanometres, reaches, within_tolerance
+from app.core.decision.limits import beyond_natural, nanometres, reaches, within_tolerance
+from app.core.natural import NaturalLimit
 from app.core.parameters import Parameters
 
 DRIFT = 7  # readings in a row on one side, beyond the zero range, are a drift
@@ -78,12 +79,11 @@ class Known:
 
     @property
     def tells_of_the_part(self) -> bool:
-        """Tell if the last reading is a size of the last part: neither declared false nor beyond R36."""
-        return (
-            not self.excluded
-            and self.deviation is not None
-            and not reaches(nanometres(self.deviation), self.parameters.limits.confidence)
-        )
+        """Tell if the last reading is a size of the last part: neither declared false nor beyond R36 or a natural limit."""
+        if self.excluded or self.deviation is None:
+            return False
+        size, rules = nanometres(self.deviation), self.parameters.rules
+        return not reaches(size, rules.confidence) and not beyond_natural(size, rules.natural, rules.zero_range)
 
     @property
     def old_from(self) -> datetime | None:
@@ -122,10 +122,15 @@ def state_of(known: Known) -> CharacteristicState:
 
 
 def drift(trend: Sequence[float], parameters: Parameters) -> CharacteristicState | None:
-    """The drift state when the last readings all lie on one side beyond the zero range, else None."""
+    """The drift state when the last readings all lie on one side beyond the zero range, else None.
+
+    From a natural limit all readings lie on one side whatever the process does: there it takes the averaging limit.
+    """
     last = [nanometres(deviation) for deviation in trend[-DRIFT:]]
-    if len(last) == DRIFT and min(last) > parameters.limits.zero_range:
+    natural = parameters.natural_limit is not NaturalLimit.NONE
+    beyond = parameters.limits.averaging if natural else parameters.limits.zero_range
+    if len(last) == DRIFT and min(last) > beyond:
         return CharacteristicState.DRIFTING_UP
-    if len(last) == DRIFT and max(last) < -parameters.limits.zero_range:
+    if len(last) == DRIFT and max(last) < -beyond:
         return CharacteristicState.DRIFTING_DOWN
     return None

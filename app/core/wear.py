@@ -236,7 +236,7 @@ def limits_of(parameters: Parameters, way: float, total: float, lifted: float = 
     sign = 1.0 if way >= 0 else -1.0
     limits = {
         Towards.WEAR: sign * parameters.wear_limit,
-        Towards.TOLERANCE: total / parameters.factor + lifted + sign * parameters.tolerance_width / 2,
+        Towards.TOLERANCE: total / parameters.factor + lifted + sign * parameters.half,
     }
     if parameters.max_total is not None and not parameters.measures_only:
         limits[Towards.OFFSET] = sign * parameters.max_total / abs(parameters.factor) + lifted

@@ -87,6 +87,15 @@ def um_limit(limit_mm: float, sign: str = PLUS_MINUS, digits: int = 6) -> str:
     return f"{sign}{limit_mm * 1000:.{digits}g}{NO_BREAK_SPACE}µm"
 
 
+def tolerance_um(half_mm: float, natural: str | None = None) -> str:
+    r"""A tolerance about its target: both limits at once, or the one that is judged where the target is a natural limit.
+
+    >>> tolerance_um(0.008), tolerance_um(0.0127, "lower"), tolerance_um(0.1, "upper")
+    ('±8\xa0µm', '+12.7\xa0µm', '−100\xa0µm')
+    """
+    return um_limit(half_mm, {"lower": "+", "upper": MINUS}.get(natural or "", PLUS_MINUS))
+
+
 def mm(size_mm: float | None, decimals: int = 4) -> str:
     r"""A size in mm.
 

@@ -52,6 +52,7 @@ def environment() -> Environment:
     env.filters.update(
         um=numbers.um,
         um_limit=numbers.um_limit,
+        tolerance=lambda of: numbers.tolerance_um(of.half, of.natural_limit),
         mm=numbers.mm,
         in_um=numbers.in_um,
         plain_um=numbers.plain_um,

@@ -32,6 +32,7 @@ from app.core.decision.limits import FAULT, WEAR, ZONES, Zone, within_tolerance
 from app.core.decision.step import (
     ACTIONS,
     BELIEVED,
+    BEYOND_NATURAL_LIMIT,
     CODES,
     CORRECT,
     HOLD,
@@ -124,7 +125,7 @@ def decide(
     by_hand: the size is that of the tool itself, and somebody has set its offset since it was changed: nobody knows how much
         of it that offset has in it already, so nothing is corrected until the tool is changed.
     fault: why the reading cannot be believed whatever D is: the probe triggered on its way to the surface (domain §5, *not a
-        bore*), or a touch is missing or outside its window (domain §4). A probe fault.
+        bore*), or a touch is missing or outside its window (domain §4). A probe fault, as is a value beyond a natural limit.
 
     >>> p = Parameters(target=10.0, tolerance_width=0.04, zero_range=0.004, averaging_limit=0.0133,
     ...                wear_limit=0.3, confidence_limit=1.0, weighting_factor=2, factor=-1, tool_memory=1, average_memory=1)
@@ -147,6 +148,7 @@ def decide(
     good = (
         within_tolerance(made.decided if parameters.rules.of_tool else deviation, parameters.limits) and fault is None
     )
+    good = good and made.code != BEYOND_NATURAL_LIMIT
     alarms = []
     if made.zone == FAULT:
         alarms.append(ReadingAlarm.PROBE_FAULT)

@@ -13,12 +13,16 @@ wear                    ``|D| < R36``               belongs to *probe_fault* (R3
 probe_fault             beyond
 ======================  ==========================  ============================================
 
+Where the target is a natural limit (`app.core.natural`), R35 takes the place of R35/2, and what lies beyond it is no measurement.
+
 Lengths are mm. They are compared in whole nanometres, so that 0.010 is 0.010 whatever binary
 fractions it went through.
 """
 
 from enum import StrEnum
 from typing import TYPE_CHECKING, Any, NamedTuple, Protocol, overload
+
+from app.core.natural import half_of
 
 if TYPE_CHECKING:
     import numpy as np
@@ -109,7 +113,7 @@ class Limits(NamedTuple):
 
     zero_range: int  # R33
     averaging: int  # R34
-    tolerance: int  # R35/2
+    tolerance: int  # R35/2; R35 from a natural limit
     wear: int  # R37
     confidence: int  # R36
 
@@ -119,10 +123,15 @@ class Limits(NamedTuple):
         return cls(
             nanometres(parameters.zero_range),
             nanometres(parameters.averaging_limit),
-            nanometres(parameters.tolerance_width / 2),
+            nanometres(half_of(parameters)),
             nanometres(parameters.wear_limit),
             nanometres(parameters.confidence_limit),
         )
+
+
+def beyond_natural(size: int, side: int, zero_range: int) -> bool:
+    """Return whether a size in nm lies beyond a natural limit by more than R33, the scatter of measuring. side: of `NaturalLimit`."""
+    return side * size > zero_range
 
 
 def zone_of(deviation: float, limits: "Limits | Rules") -> int:

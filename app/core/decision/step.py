@@ -8,7 +8,18 @@ from enum import StrEnum
 from math import inf
 from typing import NamedTuple
 
-from app.core.decision.limits import AVERAGE, FAULT, FULL, WEAR, ZERO, nanometres, reaches, within, zone_of
+from app.core.decision.limits import (
+    AVERAGE,
+    FAULT,
+    FULL,
+    WEAR,
+    ZERO,
+    beyond_natural,
+    nanometres,
+    reaches,
+    within,
+    zone_of,
+)
 
 # Deviations and offsets carry no more than a picometre: it removes the noise of binary fractions
 # (39.9981 - 39.992) and is a thousand times finer than any limit is compared.
@@ -49,6 +60,7 @@ class Code(StrEnum):
     FIRST_MOVE_TRIGGERED = "first_move_triggered"
     TOUCH_FAULT = "touch_fault"
     OFFSET_BY_HAND = "offset_by_hand"
+    BEYOND_NATURAL_LIMIT = "beyond_natural_limit"
 
 
 CODES = tuple(Code)
@@ -56,6 +68,7 @@ WITHIN_ZERO_RANGE, AVERAGE_KEPT, AVERAGED_DEVIATION, FULL_DEVIATION, OUT_OF_TOLE
 TOOL_WORN_HELD, TOOL_WORN_RELEASED, PROBE_FAULT, PAUSED, MEASURE_ONLY = range(5, 10)
 BEFORE_TOOL_CHANGE, OFFSET_LIMIT, REJECTED, IMPLAUSIBLE, IMPORTED, FIRST_MOVE_TRIGGERED, TOUCH_FAULT = range(10, 17)
 OFFSET_BY_HAND = 17
+BEYOND_NATURAL_LIMIT = 18
 BELIEVED = -1
 
 
@@ -63,7 +76,8 @@ class Rules(NamedTuple):
     """The parameters that a step goes by: limits in nm as in `Limits`, lengths in mm, infinity for a bound that is not set.
 
     averages: there is a memory for the running average (R11). of_tool: the size is that of the tool itself, which no correction
-    changes, and corrects its offset. Loops hand over a row of an array with these fields.
+    changes, and corrects its offset. natural: side of the natural limit, 0 for none. Loops hand over a row of an array with these
+    fields.
     """
 
     zero_range: int  # R33
@@ -80,6 +94,7 @@ class Rules(NamedTuple):
     holds_wear: bool
     rejected_may_correct: bool
     of_tool: bool = False
+    natural: int = 0
 
 
 class Step(NamedTuple):
@@ -184,6 +199,8 @@ def step(
     zone = zone_of(decided, rules)
     if rules.of_tool and zone < WEAR and reaches(nanometres(deviation), rules.wear):
         zone = WEAR  # corrected or not, the tool is as worn as it is
+    if fault == BELIEVED and beyond_natural(nanometres(deviation), rules.natural, rules.zero_range):
+        fault = BEYOND_NATURAL_LIMIT
     if fault != BELIEVED or reaches(nanometres(deviation), rules.confidence):
         zone = FAULT
     if zone == FAULT:

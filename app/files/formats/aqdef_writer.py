@@ -14,6 +14,7 @@ from enum import IntEnum
 from pathlib import Path
 from typing import NamedTuple
 
+from app.core.natural import NaturalLimit
 from app.files.formats.aqdef import encoding_of
 from app.files.formats.aqdef_values import OF_CHARACTERISTIC, OF_FIELD
 from app.language.i18n import _
@@ -72,14 +73,13 @@ class Described(NamedTuple):
     decimals: int = 4
     importance: int | None = None
     gauge: str = ""
+    natural_limit: NaturalLimit = NaturalLimit.NONE
 
-    @property
-    def lower_kind(self) -> LimitKind:
-        """K2120: a lower limit of 0 below a nominal size of 0 is that of a form error."""
-        if self.lower is None:
+    def kind_of(self, limit: NaturalLimit) -> LimitKind:
+        """K2120 of the lower limit, K2121 of the upper one."""
+        if (self.lower if limit is NaturalLimit.LOWER else self.upper) is None:
             return LimitKind.NONE
-        natural = self.lower == 0 and (self.upper or 0) > 0 and not self.nominal
-        return LimitKind.NATURAL if natural else LimitKind.LIMIT
+        return LimitKind.NATURAL if self.natural_limit is limit else LimitKind.LIMIT
 
 
 class Written(NamedTuple):
@@ -270,8 +270,8 @@ class _Header(_Texts):
             for key, value in (("K2112", described.lower), ("K2113", described.upper)):
                 if value is not None:
                     yield f"{key}/{index} {plain_number(round(value - described.nominal, 9))}"
-        yield f"K2120/{index} {described.lower_kind.value}"
-        yield f"K2121/{index} {(LimitKind.NONE if described.upper is None else LimitKind.LIMIT).value}"
+        yield f"K2120/{index} {described.kind_of(NaturalLimit.LOWER).value}"
+        yield f"K2121/{index} {described.kind_of(NaturalLimit.UPPER).value}"
         yield f"K2142/{index} {self.fit('K2142', described.unit)}"
         if described.gauge:
             yield f"K2402/{index} {self.fit('K2402', described.gauge)}"

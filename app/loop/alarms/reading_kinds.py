@@ -5,7 +5,7 @@ from sqlalchemy.orm import object_session
 
 from app.core.probing import TouchError
 from app.language.i18n import _
-from app.language.numbers import um, um_limit
+from app.language.numbers import tolerance_um, um
 from app.loop.alarms.kinds import AlarmKind, register
 from app.loop.readings.wording import first_move_sentence, touch_problem
 from app.loop.tables.alarms import Alarm
@@ -13,7 +13,10 @@ from app.loop.tables.connections import Connection
 
 
 def _deviation(alarm: Alarm, text: str) -> str:
-    values = {"deviation": um(alarm.data.get("deviation")), "limit": um_limit(alarm.data.get("limit") or 0.0)}
+    values = {
+        "deviation": um(alarm.data.get("deviation")),
+        "limit": tolerance_um(alarm.data.get("limit") or 0.0, alarm.data.get("natural_limit")),
+    }
     return text.format(tool=alarm.tool_memory, **values)
 
 
@@ -75,6 +78,12 @@ def _probe_fault(alarm: Alarm) -> str:
         return f"{first_move_sentence(alarm.data.get('feature'))} {_('Compensation is paused.')}{_cannot_be_stopped(alarm)}"
     if "touch" in alarm.data:
         return f"{touch_problem(TouchError(**alarm.data['touch']))} {_('Compensation is paused.')}{_cannot_be_stopped(alarm)}"
+    if alarm.data.get("beyond_natural_limit"):
+        text = _(
+            "Deviation {deviation} lies beyond the natural limit, where no part can be: the probe, the zero or the sign is wrong. "
+            "Compensation is paused."
+        )
+        return f"{_deviation(alarm, text)}{_cannot_be_stopped(alarm)}"
     text = _(
         "Deviation {deviation} cannot be: it has reached the confidence limit {limit}. The probe or the program "
         "is wrong; compensation is paused."

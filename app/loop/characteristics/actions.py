@@ -9,6 +9,7 @@ from sqlalchemy.orm import Session
 from app.access.audit.actions import record
 from app.core.decision.limits import nanometres
 from app.core.fits import with_fit
+from app.core.natural import target_of
 from app.core.parameters import (
     BY_R,
     TWO_POINT_SWITCH,
@@ -124,7 +125,7 @@ def merged(current: Mapping[str, Any], given: Mapping[str, Any]) -> dict[str, An
     """The current set with what was given in its place, for `read`.
 
     Nominal with deviations, or target with width: what is given replaces what was said the other way. R34 at its default
-    follows R35.
+    follows R35. Another natural limit moves the target, the limits stay.
     """
     changed = dict(current)
     given = {  # R24 = 0 leaves the other variants as they are
@@ -138,13 +139,25 @@ def merged(current: Mapping[str, Any], given: Mapping[str, Any]) -> dict[str, An
         drop: tuple[str, ...] = TARGET
     elif named & set(TARGET):
         drop = DRAWING
+    elif "natural_limit" in names.values():
+        drop = ("target",)
+        if current.get("nominal") is None:
+            given = {"target": _target_for(given, Parameters.from_dict(current)), **given}
     else:
         drop = ()
-    if changed.get("averaging_limit") == default_averaging_limit(current["tolerance_width"]):
+    if changed.get("averaging_limit") == default_averaging_limit(
+        current["tolerance_width"], current.get("natural_limit")
+    ):
         drop = (*drop, "averaging_limit")  # it was left to follow the tolerance, and goes on following it
     for name in (*drop, *names.values()):
         changed.pop(name, None)
     return changed | given
+
+
+def _target_for(given: Mapping[str, Any], current: Parameters) -> float:
+    """The target of the same limits with the natural limit that is given."""
+    lower, upper = current.sizes
+    return target_of(0.0, upper, lower, given.get("natural_limit"))
 
 
 def _name_of(raw: str) -> str:

@@ -15,6 +15,7 @@ from app.core.parameters import (
     ParameterError,
     Problem,
     read,
+    unusual_natural,
     unusual_on,
     unusual_switch,
 )
@@ -155,6 +156,7 @@ def warnings_of(
         unusual = []
     unusual += unusual_on(parameters.as_dict(), MachineType(machine.type))
     unusual += unusual_switch(given or {})
+    unusual += unusual_natural(given or {}, parameters)
     if nanometres(parameters.zero_range) < nanometres(machine.zero_range_floor):
         values = {"value": parameters.zero_range, "floor": machine.zero_range_floor}
         unusual.append(Problem("zero_range", "signal_path", values, warning=True))

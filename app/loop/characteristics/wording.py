@@ -29,6 +29,7 @@ def label(name: str) -> str:
         "lower_deviation": _("Lower deviation"),
         "target": _("Target"),
         "tolerance_width": _("Tolerance width"),
+        "natural_limit": _("Natural limit"),
         "zero_range": _("Zero range"),
         "averaging_limit": _("Averaging limit"),
         "wear_limit": _("Wear limit"),
@@ -65,8 +66,12 @@ def explanation(name: str) -> str | None:
             "or radius tells its wear and, unless it is only measured, corrects its offset."
         ),
         "nominal": _("As on the drawing. With a tolerance class, 40 h6 (ISO 286), the deviations follow from it."),
-        "target": _("Aimed at: the middle of the tolerance."),
+        "target": _("Aimed at: the middle of the tolerance, or the natural limit."),
         "tolerance_width": _("Upper minus lower limit."),
+        "natural_limit": _(
+            "The limit that no part can pass: the lower one of roundness, run-out, straightness, roughness. It is the target, and "
+            "carries no index and no ppm. Not given: lower where nominal and lower deviation are 0 and nothing is corrected."
+        ),
         "zero_range": _("Up to here a deviation is scatter: nothing is corrected."),
         "averaging_limit": _("Up to here the running average decides. Empty: a third of the tolerance."),
         "wear_limit": _("From here on the tool is worn: an operator decides."),
@@ -123,6 +128,11 @@ def choice(name: str, value: str) -> str:
             "automatic": _("Automatic"),
             "approval": _("Approval by a person"),
             "measure_only": _("Measure only"),
+        },
+        "natural_limit": {
+            "none": _("None: parts can lie on both sides"),
+            "lower": _("Lower limit: nothing is below"),
+            "upper": _("Upper limit: nothing is above"),
         },
         "wear_policy": {
             "hold": _("Hold for the operator"),
@@ -258,7 +268,21 @@ def sentence(problem: Problem) -> str:
             "{name} {points} do not fit acceptance by {sections} sections; say {sections}, or leave it out"
         ).format(name=name, points=data.get("points"), sections=data.get("sections")),
         "accept": _('Acceptance must be {"n": n, "m": m} with whole numbers, 1 ≤ n ≤ m ≤ 100, for example 2 of 3'),
-    }.get(problem.code, problem.code)
+    }.get(problem.code) or _natural(problem)
+
+
+def _natural(problem: Problem) -> str:
+    if problem.code not in {"natural_corrected", "natural_assumed"}:
+        return problem.code
+    if problem.code == "natural_corrected":
+        return _(
+            "A size with a natural limit (roundness, run-out) has no sign, so no offset corrects it: set R10 to 0 or the mode to "
+            "measure_only, or natural_limit to none"
+        )
+    return _(
+        "The limit {limit} was taken as a natural one, so it is the target and only the other limit is judged (nominal and "
+        "lower deviation are 0 and nothing is corrected). If sizes below it can exist, set natural_limit to none"
+    ).format(limit=millimetres(problem.data["limit"]))
 
 
 def _out_of_reach(problem: Problem, name: str) -> str:
@@ -312,16 +336,21 @@ def order_sentence(inner: str, outer: str, smaller: str, larger: str) -> str:
         "R33": _("R33 zero range"),
         "R34": _("R34 averaging limit"),
         "R35/2": "R35/2",
+        "R35": "R35",
         "R37": _("R37 wear limit"),
         "R36": _("R36 confidence limit"),
     }
-    if outer == "R35/2":
+    if outer == "R35":
+        sentence = _(
+            "{inner} {smaller} must not be larger than R35 = {larger}; lower it, or leave it empty for two thirds of the tolerance"
+        )
+    elif outer == "R35/2":
         sentence = _(
             "{inner} {smaller} must not be larger than R35/2 = {larger}; lower it, or leave it empty for a third of the "
             "tolerance"
         )
-    elif inner == "R35/2":
-        sentence = _("{outer} {larger} must not be smaller than R35/2 = {smaller}; raise it")
+    elif inner in {"R35/2", "R35"}:
+        sentence = _("{outer} {larger} must not be smaller than {inner} = {smaller}; raise it")
     elif inner == "R33":
         sentence = _("{inner} {smaller} must be smaller than {outer} {larger}; lower the one or raise the other")
     else:

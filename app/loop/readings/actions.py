@@ -138,7 +138,7 @@ def exclude_all(session: Session, entry: Entry, sequences: Sequence[int], actor:
 REMEMBERED = 8  # readings after which what one of them was makes no difference to the level (1/2 to the 8th of it)
 NOT_OF_LEVEL = (
     *("implausible", "tool_worn_held", "before_tool_change"),
-    *("probe_fault", "first_move_triggered", "touch_fault"),
+    *("probe_fault", "first_move_triggered", "touch_fault", "beyond_natural_limit"),
 )
 
 

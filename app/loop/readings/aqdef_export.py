@@ -93,14 +93,15 @@ def _part(current: CurrentCharacteristic) -> Part:
 
 def _described(current: CurrentCharacteristic, part: int) -> Described:
     parameters, characteristic = current.parameters, current.characteristic
-    half = parameters.tolerance_width / 2
+    lower, upper = parameters.sizes
     return Described(
         part,
         characteristic.key,
         characteristic.name,
         parameters.target if parameters.nominal is None else parameters.nominal,
-        round(parameters.target - half, 9),
-        round(parameters.target + half, 9),
+        lower,
+        upper,
+        natural_limit=parameters.natural_limit,
         unit=characteristic.unit,
         decimals=_decimals(parameters),
         gauge=f"probe of {current.machine.name}",

@@ -12,7 +12,7 @@ from app.language.i18n import _
 from app.loop.readings.records import MOST_OUTSTANDING, Record
 
 NAMED_AT_MOST = 3
-UNBELIEVABLE = (Code.PROBE_FAULT, Code.TOUCH_FAULT)
+UNBELIEVABLE = (Code.PROBE_FAULT, Code.TOUCH_FAULT, Code.BEYOND_NATURAL_LIMIT)
 
 
 def um(length: float) -> str:
@@ -98,7 +98,7 @@ _WORDED: dict[str, Callable[[Record, Parameters], float | int | None]] = {
     "alarm": _of_reading("paused_by"),
     "zero": _of_parameters("zero_range"),
     "averaging": _of_parameters("averaging_limit"),
-    "tolerance": lambda _record, parameters: parameters.tolerance_width / 2,
+    "tolerance": lambda _record, parameters: parameters.half,
     "wear": _of_parameters("wear_limit"),
     "confidence": _of_parameters("confidence_limit"),
     "total": _of_parameters("max_total"),
@@ -154,6 +154,12 @@ def _sentence(record: Record, parameters: Parameters) -> str:
                 "Deviation %(raw)s has reached the confidence limit %(confidence)s: the probe or the program is wrong. "
                 "The decision is to stop, and compensation pauses until the alarm is acknowledged."
             )
+        case Code.BEYOND_NATURAL_LIMIT:
+            text = _(
+                "Deviation %(raw)s lies beyond the natural limit, where no part can be, by more than the zero range %(zero)s: the "
+                "probe, the zero or the sign is wrong."
+            )
+            text = f"{text} {_stopped()}"
         case Code.FIRST_MOVE_TRIGGERED:
             text = f"{first_move_sentence(parameters.feature)} {_stopped()}"
         case Code.PAUSED:

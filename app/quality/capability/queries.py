@@ -1,7 +1,8 @@
 """The capability of a characteristic over a run of readings. Never writes. Lengths in mm.
 
 Every deviation is one from the target that was in force when the part was judged, and a part is good by the tolerance
-that was in force; indices take the limits of the newest reading. Left out are readings that somebody excluded, and probe
+that was in force; indices take the limits of the newest reading. A natural limit is a fact of the characteristic: readings from
+before it was entered are judged by it, too. Left out are readings that somebody excluded, and probe
 faults, which are no measurement of a part.
 """
 
@@ -15,6 +16,7 @@ from numpy.typing import NDArray
 from sqlalchemy.orm import Session
 
 from app.core.decision.limits import FAULT, in_nanometres, nanometres, within
+from app.core.natural import NaturalLimit, tolerance_about_target
 from app.core.spc import USUAL_READINGS, in_time, normality, stability, uncompensated
 from app.core.spc.capability import (
     ENOUGH_READINGS,
@@ -62,12 +64,13 @@ CONFIDENCE = 0.95
 
 @dataclass(frozen=True, slots=True)
 class InForce:
-    """Parameters by which some of the readings were judged: target and half the tolerance, mm."""
+    """Parameters by which some of the readings were judged: target, and the distance from it to a limit that is judged, mm."""
 
     version: int
     target: float
     half: float
     readings: int
+    natural_limit: NaturalLimit = NaturalLimit.NONE
 
 
 @dataclass(frozen=True)
@@ -98,6 +101,17 @@ class Judgement:
     stability: Stability | Refused
     baseline: int | None
     in_time: InTime | Refused
+
+    @property
+    def half(self) -> float:
+        """Distance from the target to a limit that is judged, mm."""
+        reach = self.limits.lower if self.limits.upper is None else self.limits.upper
+        return abs(reach or 0.0)
+
+    @property
+    def natural_limit(self) -> NaturalLimit:
+        """The side that carries no index, if any."""
+        return self.current.parameters.natural_limit
 
     @property
     def limits_differ(self) -> bool:
@@ -174,7 +188,7 @@ class Study(Judgement):
 
 
 def judgement_of(session: Session, current: CurrentCharacteristic, window: Window) -> Judgement:
-    """Judge the readings of the window by both limits, for the index alone. Raises `Invalid` for more than ten million."""
+    """Judge the readings of the window by every limit that is no natural one, for the index alone. Raises `Invalid` for more than ten million."""
     counted = _read(session, current, window).counted
     return Judgement(**_judged(session, current, window, counted, "both", CONFIDENCE))
 
@@ -188,9 +202,11 @@ def capability_of(
     confidence: float = CONFIDENCE,
 ) -> Study:
     """Judge the readings of the window. Raises `Invalid` for more than ten million."""
+    if current.parameters.natural_limit is not NaturalLimit.NONE:
+        side = "upper" if current.parameters.natural_limit is NaturalLimit.LOWER else "lower"
     history, faulty, counted = _read(session, current, window)
     judged = _judged(session, current, window, counted, side, confidence)
-    values, limits, result = counted["deviation"], judged["limits"], judged["indices"]
+    values, limits, result = judged["values"], judged["limits"], judged["indices"]
     outside, fallout = _outside(counted, judged["versions"], side)
     known = None if isinstance(result, Refused) else result
     without, unknown = (
@@ -230,14 +246,14 @@ def _judged(
     session: Session, current: CurrentCharacteristic, window: Window, counted: History, side: Side, confidence: float
 ) -> dict[str, Any]:
     """The fields of a `Judgement`."""
-    values: Floats = counted["deviation"]
     versions = _versions(session, current, counted)
-    half = versions[-1].half if versions else current.parameters.tolerance_width / 2
-    limits = Limits(None if side == "upper" else -half, None if side == "lower" else half, 0.0)
+    values, half, natural = _about_target(current, counted, versions)
+    judged = tolerance_about_target(half, natural)
+    limits = Limits(None if side == "upper" else judged.lower, None if side == "lower" else judged.upper, 0.0)
     compensated = not current.parameters.measures_only and bool((np.nan_to_num(counted["compensated"]) != 0).any())
     cautions = (Caution.COMPENSATED,) if compensated else ()
     indices = or_refused(lambda: capability(values, limits, confidence=confidence, cautions=cautions))
-    control_verdict, baseline = _stability(session, current, window, counted)
+    control_verdict, baseline = _stability(session, current, window, counted, values)
     at, far = counted["measured_at"], far_off(values)
     return {
         "current": current,
@@ -255,11 +271,29 @@ def _judged(
         "compensated": compensated,
         "indices": indices,
         "by_percentile": or_refused(lambda: percentile(values, limits, confidence=confidence, minimum=ENOUGH_READINGS)),
-        "by_fit": fit_if_needed(values, limits, indices, confidence=confidence),
+        "by_fit": fit_if_needed(values, limits, indices, side=natural.side, confidence=confidence),
         "stability": control_verdict,
         "baseline": baseline,
         "in_time": or_refused(lambda: in_time.in_time(values)),
     }
+
+
+def _about_target(
+    current: CurrentCharacteristic, counted: History, versions: list[InForce]
+) -> tuple[Floats, float, NaturalLimit]:
+    """The deviations, half the tolerance, and the natural limit that they are judged by, mm.
+
+    Readings from before the natural limit was entered, or after it was taken away, are brought to the target of now.
+    """
+    p, values = current.parameters, counted["deviation"]
+    others = [version for version in versions if version.natural_limit != p.natural_limit]
+    if not others:
+        return values, versions[-1].half if versions else p.half, p.natural_limit
+    shift = np.zeros(max(version.version for version in versions) + 1)
+    for version in others:
+        shift[version.version] = version.target - p.target
+    same = [version.half for version in versions if version not in others]
+    return np.round(values + shift[counted["parameters_version"]], 9), (same or [p.half])[-1], p.natural_limit
 
 
 def _moment(at: np.datetime64) -> datetime:
@@ -281,7 +315,7 @@ def _versions(session: Session, current: CurrentCharacteristic, counted: History
     versions = []
     for number, count in zip(numbers.tolist(), counts.tolist(), strict=True):
         p = characteristics.parameters_of(session, current.machine.id, current.characteristic.id, number)
-        versions.append(InForce(number, p.target, p.tolerance_width / 2, count))
+        versions.append(InForce(number, p.target, p.half, count, p.natural_limit))
     if versions:  # the newest reading's last
         newest = int(counted["parameters_version"][-1])
         versions.sort(key=lambda each: (each.version == newest, each.version))
@@ -303,7 +337,7 @@ def _outside(counted: History, versions: list[InForce], side: Side) -> tuple[int
 
 
 def _stability(
-    session: Session, current: CurrentCharacteristic, window: Window, counted: History
+    session: Session, current: CurrentCharacteristic, window: Window, counted: History, values: Floats
 ) -> tuple[Stability | Refused, int | None]:
     """By the baseline in force, if it is one of deviations and tells of these readings; else by the readings themselves."""
     baseline = control.baseline_in_force(session, current.characteristic)
@@ -313,7 +347,7 @@ def _stability(
             inside = np.isin(charted.last, counted["sequence"])
             z, rules = charted.chart.z[inside], control.rules_of(baseline)
             return stability.stability(z, rules, frozen=True), baseline.version
-    return or_refused(lambda: stability.of_readings(counted["deviation"])), None
+    return or_refused(lambda: stability.of_readings(values)), None
 
 
 @dataclass(slots=True)

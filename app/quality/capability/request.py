@@ -5,7 +5,10 @@ from typing import Annotated, NamedTuple
 from fastapi import Depends, Query
 from sqlalchemy.orm import Session
 
+from app.core.natural import NaturalLimit
 from app.core.period import Period
+from app.errors import Invalid
+from app.language.i18n import _
 from app.loop.characteristics.queries import CurrentCharacteristic
 from app.loop.summaries import queries as statistics
 from app.quality.capability import queries
@@ -30,7 +33,12 @@ Last = Annotated[
         description="Of the last so many readings, or of `all`; the last 1000 where neither this nor a time is given.",
     ),
 ]
-OneSide = Annotated[Side, Query(description="Both limits, or only one of them.")]
+OneSide = Annotated[
+    Side,
+    Query(
+        description="Both limits, or only one of them. A natural limit is never judged: `both` is the other one alone."
+    ),
+]
 Confidence = Annotated[float, Query(gt=0.5, lt=1, allow_inf_nan=False, description="Of the intervals.")]
 
 
@@ -48,7 +56,14 @@ StudyRequestDep = Annotated[StudyRequest, Depends(study_request)]
 
 
 def study_of(session: Session, current: CurrentCharacteristic, choice: StudyRequest) -> Study:
-    """Return the study of the readings that were chosen."""
+    """Return the study of the readings that were chosen. Raises `Invalid` for the side of a natural limit."""
+    natural = current.parameters.natural_limit
+    if natural is not NaturalLimit.NONE and choice.side == natural.value:
+        raise Invalid.at(
+            "side",
+            _("is the side of the natural limit, beyond which no part can be: it carries no index (ISO 22514-2)"),
+            do=_("Leave side out, or choose the other limit."),
+        )
     last = choice.last or ("all" if choice.period.bounded else str(USUAL))
     window = statistics.window_of(
         session,

@@ -5,6 +5,7 @@ from typing import Any, Literal
 
 from pydantic import BaseModel, Field
 
+from app.core.natural import NaturalLimit
 from app.core.spc.capability import Fallout, Index, PercentileCapability
 from app.core.spc.distributions import Family
 from app.core.spc.fitting import Fit, Fitted
@@ -36,14 +37,20 @@ class IndexOut(BaseModel):
 class FalloutOut(BaseModel):
     """Parts per million beyond the limits."""
 
-    below: float
-    above: float
+    below: float | None = Field(description="null beyond a natural limit.")
+    above: float | None
     total: float
 
     @classmethod
-    def of(cls, found: Fallout | None) -> "FalloutOut | None":
+    def of(cls, found: Fallout | None, natural: NaturalLimit) -> "FalloutOut | None":
         """None where there is nothing to count."""
-        return cls(below=found.below, above=found.above, total=found.total) if found else None
+        if found is None:
+            return None
+        return cls(
+            below=None if natural is NaturalLimit.LOWER else found.below,
+            above=None if natural is NaturalLimit.UPPER else found.above,
+            total=found.total,
+        )
 
 
 class NormalityOut(BaseModel):
@@ -166,8 +173,9 @@ class InForceOut(BaseModel):
 
     version: int
     target: float
-    half: float = Field(description="Half the tolerance width, R35/2.")
+    half: float = Field(description="From the target to a limit: R35/2, or R35 from a natural limit.")
     readings: int
+    natural_limit: Literal["none", "lower", "upper"]
 
 
 class CapabilityOut(BaseModel):
@@ -184,8 +192,14 @@ class CapabilityOut(BaseModel):
     far: list[int] = Field(
         description="Readings more than ten sigma of the middle half from the median: counted, but to be looked at; at most 1000."
     )
-    lower_limit: float | None = Field(description="Limits of the deviation, of the newest reading's version.")
+    lower_limit: float | None = Field(
+        description="Limits of the deviation, of the newest reading's version; null for a natural one."
+    )
     upper_limit: float | None
+    natural_limit: Literal["none", "lower", "upper"] = Field(
+        description="The limit that no part can pass: it carries no index and no ppm."
+    )
+    one_sided: str | None = Field(description="Why `cp`, `pp` and `cpm` are null; null where both limits are judged.")
     versions: list[InForceOut] = Field(description="By which the readings were judged, the newest reading's last.")
     confidence: float
     mean: float | None
@@ -251,6 +265,7 @@ def capability_out(study: Study) -> CapabilityOut:
         far=study.far[:MOST_NAMED],
         lower_limit=study.limits.lower,
         upper_limit=study.limits.upper,
+        one_sided=wording.one_sided(study),
         versions=[InForceOut(**_fields(version)) for version in study.versions],
         mean=result.mean if result else None,
         sigma_within=result.within.value if result else None,
@@ -262,11 +277,11 @@ def capability_out(study: Study) -> CapabilityOut:
         pp=IndexOut.of(result.pp if result else None),
         ppk=IndexOut.of(result.ppk if result else None),
         cpm=IndexOut.of(result.cpm if result else None),
-        fitted=_fitted(study.by_fit) if isinstance(study.by_fit, Fitted) else None,
+        fitted=_fitted(study.by_fit, study.natural_limit) if isinstance(study.by_fit, Fitted) else None,
         percentiles=_percentiles(by_percentile) if by_percentile else None,
-        ppm_within=FalloutOut.of(study.within),
-        ppm_overall=FalloutOut.of(study.overall),
-        ppm_observed=FalloutOut.of(study.fallout),
+        ppm_within=FalloutOut.of(study.within, study.natural_limit),
+        ppm_overall=FalloutOut.of(study.overall, study.natural_limit),
+        ppm_observed=FalloutOut.of(study.fallout, study.natural_limit),
         refused=statistics.refusal(study.indices) if isinstance(study.indices, Refused) else None,
         normality=[
             NormalityOut.of("anderson_darling", study.anderson),
@@ -293,13 +308,13 @@ def _fit(fit: Fit) -> dict[str, Any]:
     }
 
 
-def _fitted(found: Fitted) -> FittedOut:
+def _fitted(found: Fitted, natural: NaturalLimit) -> FittedOut:
     return answer_from(
         FittedOut,
         found,
         **_fit(found.fit),
         ppk=IndexOut.of(found.ppk),
-        ppm=FalloutOut.of(found.ppm),
+        ppm=FalloutOut.of(found.ppm, natural),
         why=fit_wording.reason(found),
         tried=[FitOut(**_fit(fit)) for fit in found.tried],
     )

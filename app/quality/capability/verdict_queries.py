@@ -140,7 +140,6 @@ def verdicts_of(
 
 def _row(judgement: Judgement, state: State) -> CapabilityVerdict:
     quoting, sequence = judgement.quoting, judgement.sequence
-    assert judgement.limits.upper is not None
     return CapabilityVerdict(
         machine_id=state.machine_id,
         characteristic_id=state.characteristic_id,
@@ -151,7 +150,7 @@ def _row(judgement: Judgement, state: State) -> CapabilityVerdict:
         baseline=state.baseline,
         excluded=state.excluded,
         rule=RULE,
-        half=judgement.limits.upper,
+        half=judgement.half,
         readings=len(sequence),
         first=int(sequence[0]) if len(sequence) else None,
         last=int(sequence[-1]) if len(sequence) else None,

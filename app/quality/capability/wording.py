@@ -1,5 +1,6 @@
 """The words of capability: verdicts, tests, models in time, and which index may be quoted."""
 
+from app.core.natural import NaturalLimit
 from app.core.spc.capability import Caution, Index
 from app.core.spc.fitting import Fitted
 from app.core.spc.in_time import ALPHA, InTime, Location, Model, Test
@@ -8,7 +9,7 @@ from app.core.spc.quoting import Quoting, WhyNot
 from app.core.spc.refusal import Reason, Refused
 from app.core.spc.stability import Fired, Stability
 from app.language.i18n import _, ngettext
-from app.language.numbers import fixed, signed
+from app.language.numbers import fixed, signed, tolerance_um
 from app.loop.summaries import wording as statistics
 from app.quality.capability import fit_wording as fits
 from app.quality.capability.queries import Study
@@ -78,6 +79,22 @@ def window_of(study: Study) -> str:
     places = study.sequence
     first, last = (int(places[0]), int(places[-1])) if len(places) else (None, None)
     return window(len(study.values), first, last, study.quote, preliminary=study.quoting.preliminary)
+
+
+def one_sided(study: Study) -> str | None:
+    """Say why there is neither Cp, Pp nor Cpm, and on which side there is no index; None where both limits are judged."""
+    if study.side == "both":
+        return None
+    if study.natural_limit is NaturalLimit.NONE:
+        return _("Judged by one limit only: Cp, Pp and Cpm compare the whole tolerance, so they are not given.")
+    edge = f"{study.current.parameters.target:g}"
+    which = (
+        _("The lower limit {edge} mm is a natural one: no part can be below it.")
+        if study.natural_limit is NaturalLimit.LOWER
+        else _("The upper limit {edge} mm is a natural one: no part can be above it.")
+    )
+    rest = _("That side carries no index and no ppm, and Cp, Pp and Cpm do not exist (ISO 22514-2).")
+    return f"{which.format(edge=edge)} {rest}"
 
 
 def index(value: float | None) -> str:
@@ -338,8 +355,8 @@ def cautions(study: Study) -> list[str]:
     if study.limits_differ:
         sentences.append(
             _(
-                "The tolerance changed in this time: indices take ±{half} µm of version {version}, parts outside are counted by the tolerance each was judged by."
-            ).format(half=f"{study.versions[-1].half * 1000:g}", version=study.versions[-1].version)
+                "The tolerance changed in this time: indices take {half} of version {version}, parts outside are counted by the tolerance each was judged by."
+            ).format(half=tolerance_um(study.half, study.natural_limit), version=study.versions[-1].version)
         )
     elif study.targets_differ:
         sentences.append(_("The target changed in this time: every deviation is one from the target in force."))

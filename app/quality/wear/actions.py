@@ -71,7 +71,13 @@ def _tell(session: Session, current: CurrentCharacteristic, hunting: Hunting) ->
     }
 
 
-SAID = ("zero_range", "averaging_limit", "weighting_factor", "tolerance_width")  # settings that the sentences name
+SAID = (
+    "zero_range",
+    "averaging_limit",
+    "weighting_factor",
+    "tolerance_width",
+    "natural_limit",
+)  # settings that the sentences name
 
 
 def _moved() -> Select[str, int, int]:

@@ -30,6 +30,7 @@ from app.charts import (
 )
 from app.core import forecast
 from app.core.forecast import PUBLIC_WIDENING, Forecast
+from app.core.natural import NaturalLimit, tolerance_about_target
 from app.core.wear import Fit, Towards
 from app.language.i18n import _
 from app.language.numbers import um
@@ -72,6 +73,13 @@ class WearChart:
     removed: float
     corrects: bool
     widening: float = PUBLIC_WIDENING
+    natural_limit: NaturalLimit = NaturalLimit.NONE
+
+    @property
+    def ends(self) -> tuple[float, float]:
+        """Both ends of the tolerance, from the target; the target itself is one where it is a natural limit."""
+        tolerance = tolerance_about_target(self.half, self.natural_limit)
+        return tolerance.lower or 0.0, tolerance.upper or 0.0
 
 
 def wear_figure(chart: WearChart, *, width: int = 1240) -> Chart:
@@ -93,11 +101,11 @@ def wear_figure(chart: WearChart, *, width: int = 1240) -> Chart:
         for worn, removed in zip(life.worn, life.removed, strict=True)
         for value in (
             *([worn] if abs(worn - removed) <= FAR * chart.half else ()),
-            removed - chart.half,
-            removed + chart.half,
+            removed + chart.ends[0],
+            removed + chart.ends[1],
         )
     ]
-    heights += [chart.removed - chart.half, chart.removed + chart.half, *near.values()]
+    heights += [*(chart.removed + end for end in chart.ends), *near.values()]
     if chart.fit is not None and ahead:
         edge, wide = chart.fit.at(ahead), chart.fit.half_width(ahead, single=True)
         heights += [edge - wide, edge + wide]
@@ -146,7 +154,7 @@ def _band(life: Life, chart: WearChart, ahead: float) -> list[Series]:
     centre = [*life.removed, *([chart.removed] if ahead else [])]
     if ahead:
         centre[-2] = chart.removed
-    low, high = ([_um(value + side * chart.half) for value in centre] for side in (-1, 1))
+    low, high = ([_um(value + end) for value in centre] for end in chart.ends)
     name = _("Tolerance about it") if life is chart.now else ""
     return band(x, low, high, "band-1", metas=("tolerance", "tolerance"), pen=Pen("faint", 0, steps="hv"), name=name)
 

@@ -6,6 +6,7 @@ from typing import Any
 
 from app.core.forecast import ENOUGH, NO_RECORD, Forecast, Record
 from app.core.hunting import GOAL, Hunting, LoopVerdict, Remedy
+from app.core.natural import half_width
 from app.core.parameters import Parameters
 from app.core.wear import FEWEST, Fit, Towards
 from app.language.i18n import _, ngettext
@@ -225,7 +226,7 @@ def remedy_sentence(data: Mapping[str, Any], settings: Mapping[str, Any]) -> str
         "goal": _share(GOAL),
     }
     if remedy.averaging_limit is not None:
-        if remedy.averaging_limit > settings["tolerance_width"] / 2:
+        if remedy.averaging_limit > half_width(settings["tolerance_width"], settings.get("natural_limit")):
             return _(
                 "No setting helps: the process scatters too much for this tolerance. Average more touches (R27), or find what "
                 "makes it scatter."

@@ -19,7 +19,8 @@ def chart_of(answer: Simulation) -> CourseChart:
         other=thinned(sequence, answer.other_result.deviation[past.mine]),
         today_taken=thinned(sequence, answer.today_result.offset[past.mine] / parameters.factor),
         other_taken=thinned(sequence, answer.other_result.offset[past.mine] / parameters.factor),
-        half=parameters.tolerance_width / 2,
+        half=parameters.half,
+        natural_limit=parameters.natural_limit,
         readings=len(sequence),
     )
 

@@ -4,6 +4,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 from app.charts import Axis, Chart, Dots, Panel, Pen, Room, Rule, Series, reading_axis
+from app.core.natural import NaturalLimit, tolerance_about_target
 from app.language.i18n import _
 
 FAR = 3.0  # times the tolerance: what deviates further is drawn at the edge
@@ -29,6 +30,7 @@ class CourseChart:
     other_taken: Course
     half: float
     readings: int
+    natural_limit: NaturalLimit = NaturalLimit.NONE
 
 
 def course_figure(chart: CourseChart, *, width: int = 1240) -> Chart:
@@ -64,7 +66,8 @@ def course_figure(chart: CourseChart, *, width: int = 1240) -> Chart:
         )
         for _line, taken, name, pen, _symbol in courses
     ]
-    limits = [Rule(Pen("ink", 1.25, "dash"), sign * chart.half * 1000) for sign in (-1, 1)]
+    judged = tolerance_about_target(chart.half, chart.natural_limit).judged
+    limits = [Rule(Pen("ink", 1.25, "dash"), limit * 1000) for limit in judged]
     shape = "+.0f" if high > 8 else "+.1f"
     deviations = Axis(_("Deviation, µm"), reach=(-high, high), format=shape, ticks=7, zero="faint")
     return Chart(

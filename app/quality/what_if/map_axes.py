@@ -32,7 +32,7 @@ def zero_ranges(today: Parameters, averaging_limit: float) -> list[float]:
 
 def averaging_limits(today: Parameters) -> list[float]:
     """R34 to choose from: thirds, halves and sixths of R35/2, and today's."""
-    half = today.tolerance_width / 2
+    half = today.half
     return sorted({*(round(nanometres(share * half) / 1e6, 9) for share in SHARES), today.averaging_limit})
 
 

@@ -101,13 +101,13 @@ class Simulation:
 
         None is of readings that are too coarse: a replay only shifts them, and shifted steps look finer than they are.
         """
-        half = self.past.current.parameters.tolerance_width / 2
+        tolerance = self.past.current.parameters.tolerance
         counted, mine = ~self.past.history.excluded, self.past.mine
         true = self.past.history["deviation"]
         if not self.past.resolved:
             return (UNRESOLVED,) * 3
         truly, today, other = (
-            quoting_of(deviations[self.past.inner(deviations) & counted], Limits(-half, half, 0.0))
+            quoting_of(deviations[self.past.inner(deviations) & counted], Limits(*tolerance, 0.0))
             for deviations in (true, self.today_result.deviation[mine], self.other_result.deviation[mine])
         )
         return truly, today, other
@@ -277,10 +277,9 @@ def truly_of(session: Session, past: ToolHistory) -> Figures:
     if spread is not None and not nanometres(spread * 1000):
         spread = 0.0
     mean = float(inner.mean()) if len(inner) else None
-    half = past.current.parameters.tolerance_width / 2
     ppk = None
     if spread and mean is not None and len(inner) >= FEWEST_FOR_PPK and past.resolved:
-        ppk = (half - abs(mean)) / (3 * spread)
+        ppk = past.current.parameters.tolerance.room(mean) / (3 * spread)
     return Figures(
         readings=int(counted.sum()),
         rejects=int((bad & ~reaches(size, confidence) & counted).sum()),

@@ -130,7 +130,7 @@ class ToolHistory:
         """Tell whether the readings as measured are fine enough to carry an index; of none there is nothing to refuse."""
         deviation = self.history["deviation"]
         inner = deviation[self.inner(deviation) & ~self.history.excluded]
-        return not len(inner) or resolution_of(inner, self.current.parameters.tolerance_width / 2).enough
+        return not len(inner) or resolution_of(inner, self.current.parameters.half).enough
 
     def carried(self, figures: Figures) -> Figures:
         """Figures of a replay without a Ppk, where the readings are too coarse for one: shifted steps only look finer."""

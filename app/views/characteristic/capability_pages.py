@@ -6,6 +6,7 @@ from urllib.parse import urlencode
 from fastapi import APIRouter, Query, Request, Response
 
 from app.access.deps import AnyCaller, require
+from app.core.natural import NaturalLimit
 from app.core.period import ALWAYS
 from app.core.spc.refusal import Refused
 from app.errors import Invalid
@@ -109,6 +110,7 @@ def capability_page(
                 ("upper", _("Upper only")),
                 ("lower", _("Lower only")),
             )
+            if study.natural_limit is NaturalLimit.NONE
         ],
         figure=figure,
         interval=interval,

@@ -53,13 +53,14 @@ def course_of(session: Session, compared: Compared, *, in_time: bool) -> Course:
     means: list[float | None] = [mean.value for _block, mean in blocks]
     return Course(
         compared.name,
-        current.parameters.tolerance_width / 2,
+        current.parameters.half,
         moments if in_time else list(places()),
         [*means, *deviations],
         [block.minimum for block, _mean in blocks] + deviations,
         [block.maximum for block, _mean in blocks] + deviations,
         [f"/characteristics/{key}?first={block.first}&through={block.last}" for block, _mean in blocks]
         + [reading_link(key, one.sequence) for one in readings],
+        current.parameters.natural_limit,
     )
 
 

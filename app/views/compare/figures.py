@@ -23,8 +23,9 @@ from app.charts import (
     nothing,
     time_axis,
 )
+from app.core.natural import NaturalLimit, Tolerance, tolerance_about_target
 from app.language.i18n import _
-from app.language.numbers import um, um_limit
+from app.language.numbers import tolerance_um, um
 
 LOOKS: tuple[tuple[Colour, str], ...] = (
     ("steady", "circle"),
@@ -52,6 +53,12 @@ class Course:
     low: Sequence[float]
     high: Sequence[float]
     links: Sequence[str]
+    natural_limit: NaturalLimit = NaturalLimit.NONE
+
+    @property
+    def tolerance(self) -> Tolerance:
+        """The limits that are judged, mm from the target."""
+        return tolerance_about_target(self.half, self.natural_limit)
 
     @property
     def is_thinned(self) -> bool:
@@ -74,16 +81,16 @@ def compare_figure(
         marks = [
             mark for number, course in enumerate(courses) for mark in _marks(course, number, of_tolerance, named=True)
         ]
-        limits = {course.half for course in courses}
+        limits = {course.tolerance for course in courses}
         common = len(limits) == 1
-        words = um_limit(courses[0].half) if common else _("tolerance")
+        words = tolerance_um(courses[0].half, courses[0].natural_limit) if common else _("tolerance")
         tolerance = _tolerance(courses[0], of_tolerance, words) if of_tolerance or common else []
         return Chart([Panel([*tolerance, *marks], _axis(reach, of_tolerance))], axis, ROOM)
     height = 1 / len(courses)
     panels = [
         Panel(
             [
-                *_tolerance(course, of_tolerance, um_limit(course.half)),
+                *_tolerance(course, of_tolerance, tolerance_um(course.half, course.natural_limit)),
                 *_marks(course, 0, of_tolerance, named=False),
                 Note(f"<b>{course.name}</b>", Share(0.0), Share(1, inside=True), "left", "bottom", (0, 3)),
                 *([] if course.x else [empty(_("No readings here"))]),
@@ -102,7 +109,7 @@ def _value(deviation: float, course: Course, of_tolerance: bool) -> float:
 
 def _reach(courses: Sequence[Course], of_tolerance: bool) -> tuple[float, float]:
     values = [_value(value, course, of_tolerance) for course in courses for value in (*course.low, *course.high)]
-    values += [_value(side * course.half, course, of_tolerance) for course in courses for side in (-1, 1)]
+    values += [_value(limit, course, of_tolerance) for course in courses for limit in (0.0, *course.tolerance.judged)]
     room = 0.06 * (max(values) - min(values))
     return min(values) - room, max(values) + room
 
@@ -114,8 +121,8 @@ def _axis(reach: tuple[float, float] | None, of_tolerance: bool, *, brief: bool 
 
 def _tolerance(course: Course, of_tolerance: bool, words: str) -> list[Mark]:
     """The limits, with words beside the upper one: those of both would meet where the scale is that of a wider tolerance."""
-    upper, lower = (_value(side * course.half, course, of_tolerance) for side in (1, -1))
-    return [Rule(Pen("quiet", 1.5), upper, words=words), Rule(Pen("quiet", 1.5), lower)]
+    limits = [_value(limit, course, of_tolerance) for limit in reversed(course.tolerance.judged)]
+    return [Rule(Pen("quiet", 1.5), limits[0], words=words), *(Rule(Pen("quiet", 1.5), limit) for limit in limits[1:])]
 
 
 def _marks(course: Course, number: int, of_tolerance: bool, *, named: bool) -> list[Mark]:

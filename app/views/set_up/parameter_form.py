@@ -7,8 +7,9 @@ from collections.abc import Mapping
 from typing import Any, NamedTuple
 
 from app.core.fits import fit_of
+from app.core.natural import assumed, half_width
 from app.core.number_text import number_or_none, plain
-from app.core.parameters import BY_NAME, FIELDS, Field, FieldKind, mean_nominal
+from app.core.parameters import BY_NAME, FIELDS, Field, FieldKind, default_averaging_limit, mean_nominal
 from app.core.programs.lines import written
 from app.language.i18n import _
 from app.language.numbers import short, um_limit
@@ -94,8 +95,8 @@ def typed_defaults() -> dict[str, str]:
 def typed_from(parameters: Mapping[str, Any]) -> dict[str, str]:
     """The form as it would have been typed for these parameters."""
     typed = {name: _text(parameters.get(name)) for name in BY_NAME}
-    width = parameters["tolerance_width"]
-    if parameters["averaging_limit"] == round(width / 3, 9):  # left to follow the tolerance
+    usual = default_averaging_limit(parameters["tolerance_width"], parameters.get("natural_limit"))
+    if parameters["averaging_limit"] == usual:  # left to follow the tolerance
         typed["averaging_limit"] = ""
     if parameters.get("nominal") is not None:  # the drawing is what was said; target and width follow from it
         typed["target"] = typed["tolerance_width"] = ""
@@ -177,19 +178,21 @@ def diagram(typed: Mapping[str, str]) -> Diagram:
     fit = fit_of(typed.get("nominal", ""))
     values = {name: _length(typed.get(name, "")) for name in BY_NAME} | (fit._asdict() if fit else {})
     target, width = values["target"], values["tolerance_width"]
+    natural = typed.get("natural_limit") or assumed(values | {"mode": typed.get("mode")})
     drawing = [values[name] for name in DRAWING]
     if all(value is not None for value in drawing):
-        target, width = mean_nominal(*[value for value in drawing if value is not None])
+        nominal, upper, lower = (value or 0.0 for value in drawing)
+        target, width = mean_nominal(nominal, upper, lower, natural)
     averaging = values["averaging_limit"]
     if averaging is None and width is not None:
-        averaging = round(width / 3, 9)
+        averaging = default_averaging_limit(width, natural)
     return Diagram(
         target,
         width,
         {
             "zero_range": values["zero_range"],
             "averaging_limit": averaging,
-            "tolerance": None if width is None else width / 2,
+            "tolerance": None if width is None else half_width(width, natural),
             "wear_limit": values["wear_limit"],
             "confidence_limit": values["confidence_limit"],
         },

@@ -10,6 +10,7 @@ from aqdefreader.file import DfqFile
 from hypothesis import given
 from hypothesis import strategies as st
 
+from app.core.natural import NaturalLimit
 from app.files.formats import aqdef, aqdef_values
 from app.files.formats.aqdef import Source
 from app.files.formats.aqdef_values import Measured, Value
@@ -19,7 +20,7 @@ from tests.chance import examples
 BEGIN = datetime(2026, 11, 23, 6, 0, 0)
 PARTS = [Part("08/15", "Shaft", "lathe-1", "Lathe 1"), Part("4711", "Bush")]
 SEAT = Described(0, "shaft-d40", "Seat Ø40", 40.0, 39.984, 40.0, gauge="Probe")
-ROUNDNESS = Described(0, "shaft-rnd", "Roundness", None, 0.0, 0.005)
+ROUNDNESS = Described(0, "shaft-rnd", "Roundness", None, 0.0, 0.005, natural_limit=NaturalLimit.LOWER)
 BORE = Described(1, "bush-d8", "Bore", 8.0, 8.0, 8.015)
 CATALOGUES = Catalogues(
     ["correction sent", "tool changed"],

@@ -11,6 +11,7 @@ from functools import partial
 
 from app.core.decision.decide import Decision, LoopState, ReadingAlarm, decide, needs_approval, outstanding_effect
 from app.core.decision.step import DECIMALS, Action, Code, deviation_of
+from app.core.natural import NaturalLimit
 from app.core.parameters import Parameters
 from app.core.plausibility import is_jump, moved, uncorrected
 from app.core.probing import Measured, TouchError, measured_value, unmeasured
@@ -278,8 +279,12 @@ def _signal(
         "characteristic": entry.characteristic,
         "deviation": decision.deviation,
         "decided": decision.decided,
-        "limit": parameters.tolerance_width / 2 if limit is None else limit,
+        "limit": parameters.half if limit is None else limit,
     }
+    if parameters.natural_limit is not NaturalLimit.NONE and not of_tool:
+        active.data["natural_limit"] = parameters.natural_limit.value
+    if decision.code is Code.BEYOND_NATURAL_LIMIT:
+        active.data["beyond_natural_limit"] = True
     if decision.code is Code.FIRST_MOVE_TRIGGERED:
         active.data |= {"first_move_triggered": True, "feature": parameters.feature.value}
     elif fault is not None:

@@ -12,6 +12,7 @@ from sqlalchemy import text
 from sqlalchemy.orm import Session
 
 from app.core.decision.limits import FAULT, Zone, nanometres, nanometres_sql, within, within_sql
+from app.core.natural import half_width
 from app.db.period import in_period_sql
 from app.loop.summaries.queries.chart_data import excluded_of
 from app.loop.summaries.queries.pyramid import Block, Run, cover_of
@@ -181,15 +182,16 @@ def _total(parts: Sequence[_Part], excluded: int) -> Numbers:
 
 
 def _tolerances(session: Session, characteristic: Characteristic) -> dict[int, int]:
-    """Half the width of the tolerance (nm) by the version of the parameters."""
+    """Distance from the target to a limit (nm) by the version of the parameters."""
     rows = session.execute(
         text(
-            "SELECT version, CAST(parameters ->> 'tolerance_width' AS float8) FROM parameters_version "
+            "SELECT version, CAST(parameters ->> 'tolerance_width' AS float8), parameters ->> 'natural_limit' "
+            "FROM parameters_version "
             "WHERE machine_id = :machine AND characteristic_id = :characteristic"
         ).columns(ParametersVersion.version),
         {"machine": characteristic.machine_id, "characteristic": characteristic.id},
     )
-    return {version: nanometres(width / 2) for version, width in rows}
+    return {version: nanometres(half_width(width, natural)) for version, width, natural in rows}
 
 
 def _excluded_in_time(session: Session, characteristic: Characteristic, excluded: Sequence[int], window: Window) -> int:

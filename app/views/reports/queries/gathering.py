@@ -7,11 +7,13 @@ from zoneinfo import ZoneInfo
 from sqlalchemy.orm import Session
 
 from app.core.decision.step import rounded
+from app.core.natural import NaturalLimit
 from app.errors import InbandError
 from app.files.documents.content import Fact, Report, Section, count, deviation, moment, size, width, words
 from app.language.i18n import _
 from app.language.times import in_zone
 from app.loop.characteristics.queries import CurrentCharacteristic
+from app.loop.characteristics.wording import choice
 from app.quality.proof import queries as proof
 from app.quality.proof import wording as proof_wording
 from app.views.reports.queries import capability, charts, control, loop, numbers, record
@@ -112,13 +114,16 @@ def _head(frame: Frame) -> list[Fact]:
             Fact("upper_deviation", _("Upper deviation"), deviation(parameters.upper_deviation), "R40"),
             Fact("lower_deviation", _("Lower deviation"), deviation(parameters.lower_deviation), "R41"),
         ]
-    half = parameters.tolerance_width / 2
     facts += [
         Fact("target", _("Target"), size(parameters.target), "R32"),
-        Fact("upper_limit", _("Upper limit"), size(rounded(parameters.target + half))),
-        Fact("lower_limit", _("Lower limit"), size(rounded(parameters.target - half))),
+        Fact("upper_limit", _("Upper limit"), size(rounded(parameters.sizes[1]))),
+        Fact("lower_limit", _("Lower limit"), size(rounded(parameters.sizes[0]))),
         Fact("tolerance_width", _("Tolerance width"), width(parameters.tolerance_width, 1), "R35"),
     ]
+    if parameters.natural_limit is not NaturalLimit.NONE:
+        facts.append(
+            Fact("natural_limit", _("Natural limit"), words(choice("natural_limit", parameters.natural_limit.value)))
+        )
     if frame.ends is not None:
         first, last = frame.ends
         facts += [

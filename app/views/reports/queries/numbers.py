@@ -46,7 +46,10 @@ def numbers(frame: Frame) -> Section:
             )
             % {"num": faults}
         )
-    tolerances = {version.parameters["tolerance_width"] for version in frame.versions_used}
+    tolerances = {
+        (version.parameters["tolerance_width"], version.parameters.get("natural_limit", "none"))
+        for version in frame.versions_used
+    }
     if len(tolerances) > 1:
         warnings.append(
             _(

@@ -5,6 +5,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
+from app.core.natural import NaturalLimit, looks_natural
 from app.core.parameters import Parameters, default_averaging_limit
 from app.core.plausibility import INCH, inch_warnings, looks_like_inches
 from app.files.formats.aqdef import LONGEST, Characteristic, Description
@@ -25,7 +26,7 @@ NATURAL = "2"
 class Content:
     """One characteristic of a file. Lengths in mm.
 
-    unit: of the file's numbers. obstacle: why it is not imported at all. not_new: why it cannot be set up out of the file.
+    unit: of the file's numbers. natural_limit: as the file says, None where it says nothing. obstacle: why it is not imported at all. not_new: why it cannot be set up out of the file.
     """
 
     index: int
@@ -41,6 +42,7 @@ class Content:
     not_new: str = ""
     remarks: tuple[str, ...] = ()
     machine: str = ""
+    natural_limit: NaturalLimit | None = None
 
     @property
     def title(self) -> str:
@@ -83,6 +85,7 @@ def _content(description: Description, each: Characteristic, unit: str | None) -
     if each.counts:
         obstacle = _("counts parts (K2004 = {kind}); Inband keeps measured sizes").format(kind=each.fields["K2004"])
     nominal, lower, upper = (None, None, None) if obstacle else _limits(each.fields, LENGTHS[own_unit], said)
+    natural = _natural(each.fields, f"{each.number} {each.name}", nominal, said)
     machine = part.get("K1081", "") or part.get("K1082", "") or _only(description.catalogues.get("K4062", {}))
     return Content(
         each.index,
@@ -98,6 +101,7 @@ def _content(description: Description, each: Characteristic, unit: str | None) -
         "" if obstacle else _not_new(nominal, lower, upper),
         tuple(said.remarks),
         machine,
+        None if obstacle else natural,
     )
 
 
@@ -160,6 +164,22 @@ def _limits(fields: Mapping[str, str], scale: float, said: _Said) -> tuple[float
     return nominal, lower, upper
 
 
+def _natural(fields: Mapping[str, str], name: str, nominal: float | None, said: _Said) -> NaturalLimit | None:
+    """The limit that the file calls natural (K2120, K2121 = 2); an ordinary lower one of a form error is not believed."""
+    lower, upper = (fields.get(key, "").strip() == NATURAL for key in ("K2120", "K2121"))
+    if lower and upper:
+        said.remarks.append(
+            _("both limits are natural ones (K2120, K2121 = 2), so nothing would be judged: both are judged")
+        )
+        return NaturalLimit.NONE
+    if lower or upper:
+        return NaturalLimit.LOWER if lower else NaturalLimit.UPPER
+    if fields.get("K2111") and not (fields.get("K2110") or fields.get("K2112") or nominal):
+        return NaturalLimit.LOWER  # as `_limits` has it: a form error
+    ordinary = fields.get("K2120", "").strip() == "1" and not looks_natural(name)
+    return NaturalLimit.NONE if ordinary else None
+
+
 def _not_new(nominal: float | None, lower: float | None, upper: float | None) -> str:
     if lower is None or upper is None:
         missing = "K2110" if upper is not None else "K2111"
@@ -179,15 +199,19 @@ def parameters_of(content: Content) -> dict[str, Any]:
     lower, upper = content.lower or 0.0, content.upper or 0.0
     nominal = content.target or 0.0
     width = round(upper - lower, 9)
+    natural = content.natural_limit
+    if natural is None and lower == 0 and nominal == 0:
+        natural = NaturalLimit.LOWER
     wear = max(0.3, width)
     return {
         "nominal": round(nominal, 9),
         "upper_deviation": round(upper - nominal, 9),
         "lower_deviation": round(lower - nominal, 9),
-        "zero_range": round(default_averaging_limit(width) / 4, 9),
+        "zero_range": round(default_averaging_limit(width, natural) / 4, 9),
         "wear_limit": wear,
         "confidence_limit": max(1.0, 2 * wear),
         "mode": "measure_only",
+        **({} if natural is None else {"natural_limit": natural.value}),
     }
 
 
@@ -274,10 +298,20 @@ def doubts(content: Content, parameters: Parameters) -> list[str]:
                 size=f"{target / INCH:g}", there=f"{parameters.target:g}"
             )
         )
+    natural = content.natural_limit or NaturalLimit.NONE
+    if natural is not NaturalLimit.NONE and natural is not parameters.natural_limit:
+        texts.append(
+            _(
+                "The file calls the {which} limit a natural one ({field} = 2), the characteristic does not: its index is of both "
+                "sides. Set its natural limit in Set-up."
+            ).format(
+                which=_("lower") if natural is NaturalLimit.LOWER else _("upper"),
+                field="K2120" if natural is NaturalLimit.LOWER else "K2121",
+            )
+        )
     if texts or content.lower is None or content.upper is None:
         return texts
-    half = parameters.tolerance_width / 2
-    here = (parameters.target - half, parameters.target + half)
+    here = parameters.sizes
     if max(abs(content.lower - here[0]), abs(content.upper - here[1])) > SLACK:
         texts.append(
             _(

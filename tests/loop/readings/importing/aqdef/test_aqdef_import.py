@@ -94,7 +94,8 @@ def test_what_is_known_is_found_and_what_is_missing_is_set_up(plant: Database, t
     assert [each["measured"] for each in stored(plant, length.key)] == [25.4254, 25.43048]
     with plant.begin() as session:
         parameters = characteristic_queries.characteristic_named(session, roundness.key).version.parameters
-    assert (parameters["target"], parameters["tolerance_width"], parameters["mode"]) == (0.0025, 0.005, "measure_only")
+    assert (parameters["target"], parameters["tolerance_width"], parameters["mode"]) == (0, 0.005, "measure_only")
+    assert parameters["natural_limit"] == "lower"  # K2120 = 2
     assert scalar(plant, "SELECT (SELECT count(*) FROM correction) + (SELECT count(*) FROM alarm)") == 0
 
 
