@@ -45,7 +45,8 @@ def list_readings(
     ] = None,
     limit: Limit = 100,
 ) -> Page[ReadingRow]:
-    """Readings in the order of their arrival: of a characteristic, a machine, a part, a period, or several of these at once.
+    """Readings in the order of their arrival, those of one batch by characteristic: of a characteristic, a machine, a part, a
+    period, or several of these at once.
 
     The key of a machine sees those of that machine. What is rare in millions of readings is found faster within a period.
     """
