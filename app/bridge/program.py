@@ -59,7 +59,9 @@ async def run(configuration: Configuration, store: Store) -> None:
         tasks.append(asyncio.create_task(memory.give_back_free_memory(), name="memory"))
         tasks.append(asyncio.create_task(_tidy(store, configuration.store.keep * 3600), name="tidy"))
         await _tell_what_is_left(configuration, store)
-        log.info("%d machines, server %s", len(configuration.machines), configuration.server.url)
+        log.info(
+            "machines: %s; server %s", ", ".join(each.key for each in configuration.machines), configuration.server.url
+        )
         try:
             done, _ = await asyncio.wait(tasks, return_when=asyncio.FIRST_EXCEPTION)  # cancelled, the tasks go on
             for task in done:
