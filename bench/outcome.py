@@ -1,12 +1,13 @@
 """Parts in tolerance: a machine with six tools over REST and each kind of bridge, beside the same process corrected at once.
 
-Eight characteristics, two tools with two of them, one tool without a location in the bridge. The tools wear, sizes scatter; the first
-tool is changed half way, the edge of the fifth breaks and is replaced two parts later. Parts follow each other as on a machine
+Eight characteristics, two tools with two of them, one tool without a location in the bridge. The tools wear, sizes scatter; the sister of
+the fourth tool goes on after a third of the parts, the first tool is changed half way, the edge of the fifth breaks and is replaced two parts later. Parts follow each other as on a machine
 that takes longer for a part than the bridge for a poll. ``python -m bench.outcome [--parts 300] [--kind opcua]``
 """
 
 import argparse
 import asyncio
+import contextlib
 import logging
 import random
 import ssl
@@ -26,18 +27,19 @@ from app.bridge import control_side, offering, server_side
 from app.bridge.configuration import configuration_from
 from app.bridge.program import link_of
 from app.bridge.simulators import simulator_named
-from app.bridge.simulators.model import OWNERS, UNMAPPED, Feature, Model, Steps, six_tools
+from app.bridge.simulators.model import OWNERS, SISTERS, UNMAPPED, Feature, Model, Steps, six_tools
 from app.bridge.store import Store
 from app.bridge.unit import Unit, ended
 from app.core.ring import SLOTS, Register, Status
 from bench.plant import PARAMETERS, TARGET, plant
-from inband_client import AsyncClient
+from inband_client import AsyncClient, Unavailable
 
-CHANGED, BROKEN = 1, 5
+CHANGED, WORN, BROKEN = 1, 4, 5
 TOLERANCE = 0.008
 WEAR, NOISE, BREAK = 0.0005, 0.0003, 0.05  # mm a part, mm, mm
 LEFT = 2  # parts until a broken edge is replaced
 PATIENCE = 60.0  # s
+NOBODY = "http://127.0.0.1:9"
 KINDS: dict[str, dict[str, Any]] = {
     "heidenhain": {"register": "QR31", "parameter": 31},
     "haas": {"register": "wear_diameter", "parameter": 2600},
@@ -61,6 +63,7 @@ class Process(Model):
 
     amiss: as sure as factor, sign and unit may be wrong at the control, what a correction does there; 1: what it says. swapped: tools
     whose offsets it takes for each other's. blind: the first part of which the probe does not see the first characteristic, 0: none.
+    start: deviation of the first part, mm.
     """
 
     sizes: dict[int, list[float]] = field(default_factory=dict)
@@ -69,11 +72,12 @@ class Process(Model):
     amiss: float = 1.0
     swapped: dict[int, int] = field(default_factory=dict)
     blind: int = 0
+    start: float = 0.0
 
     def size(self, feature: Feature) -> float:
         """The size that is cut and measured now."""
         scatter = random.Random(f"{feature.number} {self.parts}").gauss(0.0, feature.noise)
-        worn = feature.wear * (self.parts - self.new_at.get(feature.tool, 0))
+        worn = self.start + feature.wear * (self.parts - self.new_at.get(feature.tool, 0))
         if self.broken and feature.tool == BROKEN:
             worn += BREAK
         deviation = (
@@ -84,7 +88,7 @@ class Process(Model):
 
     def place_of(self, tool: int) -> tuple[int, int, str]:
         """The offset of a tool."""
-        return next((each.tool, each.edge, each.register) for each in self.features if each.tool == tool)
+        return next((each.tool, each.edge, each.register) for each in self.every if each.tool == tool)
 
     def send(self, characteristic: int, measured: float, tool: int, status: int = Status.GOOD) -> Steps:
         """Write the reading of a probe that may have failed."""
@@ -94,9 +98,12 @@ class Process(Model):
     def renew(self, tool: int) -> None:
         """Another edge, and its offset set to 0."""
         self.new_at[tool] = self.parts
-        for feature in self.features:
-            if feature.tool == tool:
-                self.edit((feature.tool, feature.edge, feature.register), 0.0)
+        self.edit(self.place_of(tool), 0.0)
+
+    def go_on_with_sister(self, tool: int) -> None:
+        """Another tool cuts from now on."""
+        self.worn.add(tool)
+        self.new_at[SISTERS[tool]] = self.parts
 
 
 class Outcome(NamedTuple):
@@ -120,6 +127,7 @@ class Play:
         self.call, self.machine, self.kind, self.parts = call, machine, kind, parts
         self.process = Process(features_of(kind))
         self.keys = {each.number: f"{machine}-{each.number}" for each in self.process.features}
+        self.without_server, self.eventful = range(0), True
         self.judged = tuple(each.number for each in self.process.features if each.tool != UNMAPPED)
 
     def set_up(self, **parameters: Any) -> str:
@@ -142,7 +150,14 @@ class Play:
         return str(self.call("POST", f"/machines/{self.machine}/keys", name="outcome")["secret"])
 
     def between(self, part: int) -> None:
-        """Events behind a part: the tool that is changed, the edge that breaks, and the one that replaces it."""
+        """Events behind a part: the sister that goes on, the tool that is changed, the edge that breaks, the one that replaces it."""
+        if not self.eventful:
+            return
+        if part == self.parts // 3:
+            tool = f"/machines/{self.machine}/tools/{WORN}"
+            self.call("PATCH", tool, sister=SISTERS[WORN])
+            self.call("POST", f"{tool}/switch", reason="outcome")
+            self.process.go_on_with_sister(WORN)
         if part == self.parts // 2:
             self._renewed(CHANGED)
         if part == self.parts * 2 // 3:
@@ -180,7 +195,8 @@ class Play:
         in_effect: dict[int, int] = {}
         for part in range(1, self.parts + 1):
             process.parts += 1
-            for feature in process.features:
+            for each in process.features:
+                feature = process.cut_now(each)
                 size = process.size(feature)
                 failed = feature.number == 1 and 0 < process.blind <= part
                 found: dict[str, Any] = {"touches": []} if failed else {"measured": round(size, 6)}
@@ -194,7 +210,7 @@ class Play:
                 if wait == 0:
                     self._apply(feature.tool, in_effect)
             if wait and part % wait == 0:
-                for tool in sorted({each.tool for each in process.features} - {UNMAPPED}):
+                for tool in sorted({each.tool for each in process.every} - {UNMAPPED}):
                     self._apply(tool, in_effect)
             self.between(part)
 
@@ -216,8 +232,16 @@ class Play:
 
     # --- over a bridge
 
-    def over_bridge(self, url: str, secret: str, folder: Path, verify: ssl.SSLContext | bool = True) -> Outcome:
-        """The same through the simulated control of this kind and the tasks of the bridge."""
+    def over_bridge(
+        self,
+        url: str,
+        secret: str,
+        folder: Path,
+        verify: ssl.SSLContext | bool = True,
+        without_server: range = range(0),
+    ) -> Outcome:
+        """The same through the simulated control of this kind and the tasks of the bridge. without_server: parts of an outage."""
+        self.without_server = without_server
         with ThreadPoolExecutor(1) as pool:  # whoever calls may have a loop of its own
             pool.submit(lambda: asyncio.run(self._bridged(url, secret, folder, verify))).result()
         return self.outcome()
@@ -248,12 +272,18 @@ class Play:
         self.process.mail_wait = 0.5
         task = asyncio.create_task(control_side.run(unit))
         try:
-            async with AsyncClient(url, secret, patience=PATIENCE, verify=verify) as client:
+            async with (
+                AsyncClient(url, secret, patience=PATIENCE, verify=verify) as client,
+                AsyncClient(NOBODY, secret, patience=0.0) as silent,
+            ):
                 for part in range(1, self.parts + 1):
                     await self._part()
+                    if part in self.without_server:
+                        await self._kept(unit, silent)
+                        continue
                     await self._settled(unit, client)
                     self.between(part)
-                    if part in {self.parts // 2, self.parts * 2 // 3 + LEFT}:
+                    if part in {self.parts // 3, self.parts // 2, self.parts * 2 // 3 + LEFT}:
                         await self._settled(unit, client)
                 await client.heartbeat(self.machine, **await server_side.heartbeat(unit))
         finally:
@@ -267,9 +297,8 @@ class Play:
             full = registers[Register.WRITTEN] - registers[Register.ACK] >= SLOTS
             await asyncio.sleep(0.02 if full or self.process.idle else 0)
 
-    async def _settled(self, unit: Unit, client: AsyncClient) -> None:
-        """What has been measured is at the server, what it wants is with the control: a part takes longer than that."""
-        registers = self.process.registers
+    async def _stored(self, unit: Unit) -> None:
+        """What has been measured is in the bridge's store."""
 
         async def stored() -> bool:
             [rows] = await unit.store._run(  # noqa: SLF001 - a benchmark counts what is there
@@ -278,6 +307,18 @@ class Play:
             return bool(rows >= len(self.process.written))
 
         await _until(stored, "all readings are in the store")
+
+    async def _kept(self, unit: Unit, silent: AsyncClient) -> None:
+        """A part while no server answers: the bridge tries, and keeps what it has."""
+        await self._stored(unit)
+        for step in (offering.tell, server_side._forward, offering.ask):  # noqa: SLF001 - the steps of the task
+            with contextlib.suppress(Unavailable):
+                await step(unit, silent)
+
+    async def _settled(self, unit: Unit, client: AsyncClient) -> None:
+        """What has been measured is at the server, what it wants is with the control: a part takes longer than that."""
+        registers = self.process.registers
+        await self._stored(unit)
         for _ in range(3):
             for step in (offering.tell, server_side._forward, offering.ask):  # noqa: SLF001 - the steps of the task
                 await step(unit, client)

@@ -5,6 +5,7 @@ of corrections counts within a location alone: one that cannot go holds back its
 """
 
 import logging
+import math
 import time
 from collections.abc import Mapping, Sequence
 from datetime import UTC, datetime
@@ -90,6 +91,10 @@ async def ask(unit: Unit, client: AsyncClient) -> None:
     pending: dict[int, list[Correction]] = {}  # the location that waits longest first
     for correction in await client.pending(machine.key):
         pending.setdefault(correction.tool_memory, []).append(correction)
+        if unit.tool_memories.get(str(correction.characteristic)) != correction.tool_memory:
+            unit.locations_at = (
+                -math.inf
+            )  # it has another location now: no reading may name a correction of the one before
     told = await store.intents(machine.key, "told") if pending else []
     known = await store.known(machine.key)
     await unit.look_if_held()

@@ -110,7 +110,9 @@ def simulate(
     six_tools: Annotated[
         bool,
         typer.Option(
-            "--six-tools", envvar="INBAND_SIX_TOOLS", help="Eight characteristics on six tools, one without a location."
+            "--six-tools",
+            envvar="INBAND_SIX_TOOLS",
+            help="Eight characteristics on six tools, one with a sister, one without a location.",
         ),
     ] = False,
 ) -> None:

@@ -2,6 +2,8 @@
 
 import asyncio
 import json
+import math
+import time
 from collections.abc import AsyncIterator, Callable
 from dataclasses import replace
 from datetime import UTC, datetime
@@ -364,6 +366,18 @@ def test_a_reading_names_the_correction_in_effect_of_its_own_location(tmp_path: 
 
     story(tmp_path, server, before)
     assert [reading.get("correction_in_effect") for reading in server.pushed] == [7, 3, None, 5, 7, 9, None]
+
+
+@pytest.mark.parametrize(("tool", "asks"), [(3, False), (4, True)])
+def test_where_a_characteristic_is_corrected_is_asked_again_when_a_correction_shows_it(
+    tmp_path: Path, tool: int, asks: bool
+) -> None:
+    """Its sister goes on: readings that named a correction of the tool before would be corrected again and again, for half a minute."""
+    unit = unit_of(Model(), store_in(tmp_path))
+    unit.tool_memories, unit.locations_at = {"shaft-1": 3}, time.monotonic()
+    server = Scripted(replace(correction(18, tool=tool), characteristic="shaft-1"))
+    run(offering.ask(unit, cast("AsyncClient", server)))
+    assert (unit.locations_at == -math.inf) is asks
 
 
 def test_a_step_beyond_the_limit_is_rejected_with_its_reason(tmp_path: Path) -> None:

@@ -11,7 +11,7 @@ import struct
 from app.bridge.kinds.heidenhain import Answered, answer_check
 from app.bridge.simulators.model import Feature, Model
 from app.core.printed_line import Printed, line_of
-from app.core.ring import Mail, Register, Slot, Unit, mail_registers
+from app.core.ring import Mail, Register, Slot, Told, Unit, mail_registers
 
 FEATURES = (Feature(tool=3, register="QR31", parameter=31, holds="radius"),)
 READINGS, CORRECTIONS = "TNC:\\inband\\readings.txt", "TNC:\\inband\\corr.h"
@@ -129,6 +129,7 @@ class TncSimulator:
         self._printed = 0
         self._answered: set[int] = set()
         self._last = b""
+        self._stopped = ""
 
     async def start(self, port: int) -> None:
         """Listen; 0 takes a free port."""
@@ -237,6 +238,9 @@ class TncSimulator:
         text = self.files.get(CORRECTIONS, b"").decode("cp1252")
         if not text.rstrip().endswith("END PGM CORR MM") and not text.rstrip().endswith("END PGM CORR INCH"):
             return
+        if (stop := re.search(r" QR5 = \+(\d+)", text)) and stop[1] != self._stopped:
+            self._stopped = stop[1]
+            self.model.told.append(Told.STOP)
         self._answered.add(round(registers[Register.ANSWERED]))
         for part in re.split(r"; Correction \d+", text)[1:]:
             number = re.search(r"QR3 = \+(\d+)", part)
@@ -248,7 +252,7 @@ class TncSimulator:
             registers[Register.MAIL_NUMBER] = registers[Register.ANSWERED]
             return
         parameter = int(expected[1])
-        feature = next((each for each in self.model.features if each.parameter == parameter), None)
+        feature = next((each for each in self.model.every if each.parameter == parameter), None)
         tool, edge = (feature.tool, feature.edge) if feature else (0, 0)
         mail = Mail(int(number[1]), tool, edge, parameter, float(expected[2]), float(value[1]))
         if registers[Register.MAIL_NUMBER] != mail.number:

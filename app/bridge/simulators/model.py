@@ -45,7 +45,8 @@ class Feature:
     """A characteristic that the machine cuts and measures.
 
     number: in the ring. register: the offset it is cut with; parameter: its number in the mailbox. holds: diameter or radius,
-    as in a location. wear: growth of the size per part; noise: standard deviation of a measurement.
+    as in a location. wear: growth of the size per part; noise: standard deviation of a measurement. sister: the tool that goes on
+    when this one is worn, 0 without one.
     """
 
     number: int = 1
@@ -59,27 +60,27 @@ class Feature:
     bias: float = 0.004
     wear: float = 0.0004
     noise: float = 0.0008
+    sister: int = 0
 
 
 OWNERS: Final = (1, 1, 2, 2, 3, 4, 5, 6)
 """Tool of each characteristic of a machine with six tools."""
 UNMAPPED: Final = 6
 """The one of them that no configuration names: nothing corrects it."""
+SISTERS: Final = {4: 7}
+"""The tool that goes on when this one is worn."""
+
+
+def on_tool(feature: Feature, tool: int) -> Feature:
+    """The characteristic cut with another tool, in the feature's words for the offset: a TNC has a QR parameter for each tool."""
+    if feature.register != f"QR{feature.parameter}":
+        return replace(feature, tool=tool, sister=SISTERS.get(tool, 0))
+    return replace(feature, tool=tool, sister=SISTERS.get(tool, 0), register=f"QR{30 + tool}", parameter=30 + tool)
 
 
 def six_tools(feature: Feature) -> tuple[Feature, ...]:
-    """Eight characteristics on six tools, with a feature's words for the offset: a TNC has a QR parameter for each tool."""
-    one_each = feature.register == f"QR{feature.parameter}"
-    return tuple(
-        replace(
-            feature,
-            number=number,
-            tool=tool,
-            register=f"QR{30 + tool}" if one_each else feature.register,
-            parameter=30 + tool if one_each else feature.parameter,
-        )
-        for number, tool in enumerate(OWNERS, start=1)
-    )
+    """Eight characteristics on six tools, and a seventh that takes the place of the fourth."""
+    return tuple(replace(on_tool(feature, tool), number=number) for number, tool in enumerate(OWNERS, start=1))
 
 
 class Applied(NamedTuple):
@@ -95,7 +96,7 @@ class Model:
     """A machine. seed: None for another noise, and another epoch, each time. history: every change of an offset, before and after,
     by the NC program or by hand. mail_wait: s that the NC program waits for the next correction after each that it has taken;
     decision_wait: s that it waits for the decision on each reading; told: holds and stops that it has acted upon; idle:
-    it waits.
+    it waits. worn: tools whose sister cuts in their place.
     """
 
     features: tuple[Feature, ...] = (Feature(),)
@@ -114,6 +115,7 @@ class Model:
     decision_wait: float = 0.0
     told: list[Told] = field(default_factory=list)
     idle: bool = False
+    worn: set[int] = field(default_factory=set)
     written: list[tuple[int, Slot]] = field(default_factory=list)
     applied: list[Applied] = field(default_factory=list)
     refused: list[tuple[int, Answer]] = field(default_factory=list)
@@ -123,15 +125,18 @@ class Model:
     def __post_init__(self) -> None:
         """Seed the noise, and set every offset to 0."""
         self.chance = random.Random(self.seed)  # noqa: S311 - noise of a measurement
-        for feature in self.features:
+        for feature in self.every:
             self.offsets.setdefault(_place(feature), 0.0)
+
+    @property
+    def every(self) -> tuple[Feature, ...]:
+        """The characteristics as they are cut with each tool that may cut them."""
+        return (*self.features, *(on_tool(each, each.sister) for each in self.features if each.sister))
 
     @property
     def places(self) -> tuple[Feature, ...]:
         """A feature for each location of the bridge's configuration; one tool of six has none."""
-        named = {
-            _place(each): each for each in self.features if len(self.features) < len(OWNERS) or each.tool != UNMAPPED
-        }
+        named = {_place(each): each for each in self.every if len(self.features) < len(OWNERS) or each.tool != UNMAPPED}
         return tuple(named.values())
 
     # --- the NC program
@@ -142,13 +147,18 @@ class Model:
         yield from self.set_up()
         yield from self.take_corrections()
         self.parts += 1
-        for feature in self.features:
+        for each in self.features:
+            feature = self.cut_now(each)
             self.tool_in_spindle = feature.tool
             self.in_effect[feature.tool] = round(self.registers[Register.APPLIED])
             yield
             yield from self.send(feature.number, self.size(feature), feature.tool)
         self.tool_in_spindle = 0
         self.running = False
+
+    def cut_now(self, feature: Feature) -> Feature:
+        """The characteristic with the tool that cuts it now."""
+        return on_tool(feature, feature.sister) if feature.sister and feature.tool in self.worn else feature
 
     def set_up(self) -> Steps:
         """Begin a new epoch where the counters are 0; the layout is written last."""
@@ -256,7 +266,7 @@ class Model:
         return bool(self.applied) and self.applied[-1].number == number
 
     def _mailed(self, tool: int, edge: int, parameter: int) -> tuple[int, int, str] | None:
-        for feature in self.features:
+        for feature in self.every:
             if (feature.tool, feature.edge, feature.parameter) == (tool, edge, parameter):
                 return _place(feature)
         return None

@@ -155,7 +155,7 @@ class MqttSimulator:
             registers[place] = value
 
     def _feature(self, correction: dict[str, Any]) -> Feature | None:
-        for feature in self.model.features:
+        for feature in self.model.every:
             if (feature.tool, feature.edge, feature.register) == tuple(
                 correction[name] for name in ("tool", "edge", "register")
             ):
