@@ -20,7 +20,7 @@ import aiomqtt
 from app.bridge.simulators import NoPlace
 from app.bridge.simulators.model import Feature, Model
 from app.bridge.unit import ended
-from app.core.ring import Answer, Mail, Register, Slot, Told, Unit, mail_registers
+from app.core.ring import Answer, Mail, Register, Slot, Status, Told, Unit, mail_registers
 
 AT = "the broker as host:port; mosquitto is started if left out"
 AGAIN = 3.0  # s until what was not stored is sent again
@@ -182,7 +182,7 @@ def _body(key: str, slot: Slot) -> dict[str, object]:
     return {
         "key": key,
         "characteristic": str(slot.characteristic),
-        "measured": slot.measured,
+        **({"touches": []} if slot.status == Status.NO_TRIGGER else {"measured": slot.measured}),
         "part": str(slot.part),
         "correction_in_effect": slot.in_effect,
         "measured_at": datetime.now(UTC).isoformat(),
