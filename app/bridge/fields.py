@@ -4,7 +4,8 @@ from math import isfinite
 from typing import Any, Final, NamedTuple
 from zoneinfo import ZoneInfo
 
-from app.files.formats.cell_values import Unreadable, moment, number
+from app.files.formats.cell_values import Unreadable, number
+from app.files.formats.file_times import LIVE, FileTimes
 
 FIELDS: Final = ("characteristic", "measured", "measured_at", "machined_at", "part", "correction_in_effect", "key")
 """What a column, a member, or a named group of a regular expression may be."""
@@ -15,15 +16,19 @@ LONGEST_TEXT: Final = 128
 
 
 class Form(NamedTuple):
-    """The form of values. scale: mm in a unit of the sizes. times: as strptime has it. zone: of times without an offset."""
+    """The form of values. scale: mm in a unit of the sizes. times: as strptime has it. zone: of times without an offset.
+
+    together: what the times of a file say together.
+    """
 
     scale: float
     decimal: str = "."
     times: str | None = None
     zone: ZoneInfo | None = None
+    together: FileTimes = LIVE
 
     def value(self, field: str, value: Any) -> Any:
-        """The value of a field but ``characteristic``. Raises `Unreadable`, whose words go behind the value."""
+        """The value of a field but ``characteristic``; None of a time that is none. Raises `Unreadable`, whose words go behind the value."""
         text = str(value).strip()
         if field == "measured":
             if isinstance(value, bool) or not isinstance(value, int | float | str):
@@ -33,7 +38,8 @@ class Form(NamedTuple):
                 raise Unreadable("is not a number")
             return round(size * self.scale, 9)
         if field in {"measured_at", "machined_at"}:
-            return moment(text, self.zone, self.times).isoformat()
+            at = self.together.moment(text, self.zone, self.times)
+            return None if at is None else at.isoformat()
         if field == "correction_in_effect":
             if not text.isascii() or not text.isdigit() or int(text) > HIGHEST_NUMBER:
                 raise Unreadable("is not the number of a correction, such as 12")

@@ -19,21 +19,21 @@ from msgspec import Struct
 
 from app.bridge.configuration import Machine, Positive
 from app.bridge.fields import EVERY, FIELDS, Form
-from app.bridge.json_text import read_json
+from app.bridge.file_rows import Fault, Found, csv_rows, ndjson_rows
 from app.bridge.links import Received
 from app.bridge.patterns import LONGEST_LINE, Patterns, TooSlow, check_expressions
 from app.core.ring import INCH
 from app.files.formats import aqdef, aqdef_values, delimited
 from app.files.formats.aqdef_context import context_of
 from app.files.formats.aqdef_keys import Keys
-from app.files.formats.aqdef_times import WallClock, day_order, slashed
-from app.files.formats.cell_values import Unreadable, zone_named
+from app.files.formats.aqdef_times import WallClock, day_order, time_of
+from app.files.formats.cell_values import Slashed, Unreadable, slashed, zone_named
+from app.files.formats.file_times import times_of
 from app.files.formats.repeats import Repeats
 from app.files.formats.units import LENGTHS, UnknownUnit, length_unit, unit_in
 
 NAMES: Final = {"csv": "*.csv", "ndjson": "*.ndjson", "text": "*.txt", "aqdef": "*.df[qdxQDX]"}
 NOT_ALONE: Final = 2  # files of a pair
-TITLES: Final = 50  # rows in which the names of the columns are looked for
 
 
 class Settings(Struct, forbid_unknown_fields=True, frozen=True):
@@ -102,19 +102,6 @@ class Settings(Struct, forbid_unknown_fields=True, frozen=True):
             check_expressions(self.lines)
 
 
-class Fault(NamedTuple):
-    """Something for which a file cannot be taken: line where it is known, field or column, and the reason with what to do."""
-
-    line: int | None
-    field: str
-    reason: str
-
-    def __str__(self) -> str:
-        """Line, field, reason."""
-        where = ", ".join(([f"line {self.line}"] if self.line else []) + ([self.field] if self.field else []))
-        return f"{where}: {self.reason}" if where else self.reason
-
-
 class Entry(NamedTuple):
     """One reading: its line, the characteristic as the file names it, and what `POST /readings` takes, without the key."""
 
@@ -176,19 +163,6 @@ def files_of(path: Path) -> tuple[Path, ...]:
     return (source.description,) if source.values is None else (source.description, source.values)
 
 
-def _header(rows: Iterator[delimited.Row], wanted: set[str]) -> delimited.Row | None:
-    """The row that names the columns: the first one, below titles the one that has all that are wanted."""
-    first = next(rows, None)
-    if first is None or not wanted:
-        return first
-    row: delimited.Row | None = first
-    for _count in range(TITLES):
-        if row is None or wanted <= {cell.strip().lstrip("\ufeff") for cell in row.cells}:
-            return row or first
-        row = next(rows, None)
-    return first
-
-
 def _passed_over(item: aqdef_values.Value, value: aqdef_values.Measured | None) -> str:
     if value is None and not item.fields.get("K0001", "").strip():
         return "has no value; passed over"
@@ -241,9 +215,17 @@ class _Reader:
     def read(self) -> None:
         match self.settings.format:
             case "csv":
-                self._table(self._csv())
+                self._table(
+                    csv_rows(
+                        self.path,
+                        self.encoding,
+                        self.settings.delimiter,
+                        self.settings.columns,
+                        complete=self.content.complete,
+                    )
+                )
             case "ndjson":
-                self._table(self._ndjson())
+                self._table(ndjson_rows(self.lines))
             case "text":
                 self._text()
             case "aqdef":
@@ -252,55 +234,20 @@ class _Reader:
 
     # --- tables
 
-    def _csv(self) -> Iterator[tuple[int, Mapping[str, Any]]]:
-        try:
-            said = self.settings.delimiter
-            delimiter = (
-                delimited.BLANKS if said == "blanks" else said or delimited.delimiter_of(self.path, self.encoding)
-            )
-            rows = delimited.rows(self.path, self.encoding, delimiter)
-            header = _header(rows, set(self.settings.columns.values()))
-            if header is None:
-                return
-            names = [name.strip().lstrip("\ufeff") for name in header.cells]
-            for name in sorted({name for name in names if name and names.count(name) > 1}):
-                self._fault(header.line, name, "is the name of several columns; give each its own.")
-            wanted = set(self.settings.columns.values()) - set(names)
-            for name in sorted(wanted):
-                self._fault(header.line, name, f"is no column of this file; it has {', '.join(names)}.")
-            if wanted:
-                return
-            for row in delimited.even(rows, len(names), delimiter, complete=self.content.complete):
-                if isinstance(row, delimited.Unusable):
-                    self._fault(row.line, "", str(row))
-                elif [cell.strip() for cell in row.cells] == names:
-                    self._remark(aqdef.Remark(row.line, "", "", "is the heading again; passed over"))
-                else:
-                    yield row.line, dict(zip(names, row.cells, strict=False))
-        except UnicodeError:
-            self._fault(None, "", f"This is not {self.encoding} text: name the encoding of the file.")
-
-    def _ndjson(self) -> Iterator[tuple[int, Mapping[str, Any]]]:
-        for number_, line in enumerate(self.lines, 1):
-            if not line.strip().lstrip("\ufeff"):
-                continue
-            try:
-                content = read_json(line.lstrip("\ufeff"))
-            except json.JSONDecodeError as error:
-                self._fault(number_, "", f"is no JSON ({error}): one object stands in each line.")
-                continue
-            except ValueError as error:
-                self._fault(number_, "", f"{error}.")
-                continue
-            if isinstance(content, dict):
-                yield number_, content
-            else:
-                self._fault(number_, "", "is JSON but no object: each line is one {…}.")
-
-    def _table(self, rows: Iterator[tuple[int, Mapping[str, Any]]]) -> None:
+    def _table(self, rows: Iterator[tuple[int, Found]]) -> None:
         columns = self.settings.columns or {name: name for name in FIELDS}
+        table = list(rows)
+        column = columns.get("measured_at", "")
+        written = (str(row.get(column) or "") for _line, row in table if isinstance(row, Mapping))
+        self.form = self.form._replace(together=times_of(written, self.settings.times).live)
         scales: dict[str, float] = {}
-        for line, row in rows:
+        for line, row in table:
+            if isinstance(row, Fault):
+                self.content.faults.append(row)
+                continue
+            if isinstance(row, aqdef.Remark):
+                self._remark(row)
+                continue
             fields = {name: row[column] for name, column in columns.items() if column in row}
             sizes = (
                 [columns["measured"]]
@@ -355,8 +302,11 @@ class _Reader:
         description = aqdef.describe(source)
         zone, keys = self.zone, Keys()
         clocks = {} if zone is None else {index: WallClock(zone) for index in description.characteristics}
-        order = day_order(self.settings.day_first)
-        for item in aqdef_values.values(source, description):
+        items = list(aqdef_values.values(source, description))
+        written = (item.fields.get("K0004", "") for item in items if not isinstance(item, aqdef.Remark))
+        together = times_of(written, read=time_of).live
+        order = day_order(self.settings.day_first) or together.order
+        for item in items:
             if isinstance(item, aqdef.Remark):
                 self._remark(item)
                 continue
@@ -369,13 +319,15 @@ class _Reader:
                 self.content.skipped += 1
                 self._remark(aqdef.Remark(item.line, "", name, "counts parts, it measures nothing; passed over"))
                 continue
-            if order is None and slashed(item.fields.get("K0004", "")) is not None:
+            if order is None and slashed(item.fields.get("K0004", "")) is Slashed.EITHER:
                 self._fault(item.line, "K0004", "could be day/month or month/day: set day_first to true or false.")
                 continue
             value = aqdef_values.read_value(item, order)
             if isinstance(value, aqdef.Remark):
                 self._remark(value)
                 continue
+            if value is not None and value.at is not None:
+                value = value._replace(at=together.settled(value.at))
             alone = None
             if value is not None and value.at is not None:
                 unit = length_unit(characteristic.fields.get("K2142", ""))
@@ -416,7 +368,11 @@ class _Reader:
             if value.at.tzinfo is None and clock is None:
                 self._fault(item.line, "K0004", "does not say its time zone: set zone, such as Europe/Belgrade.")
                 return
-            body["measured_at"] = (clock.moment(value.at) if clock else value.at).isoformat()
+            try:
+                body["measured_at"] = (clock.moment(value.at) if clock else value.at).isoformat()
+            except Unreadable as error:
+                self._fault(item.line, "K0004", f"{item.fields.get('K0004', '')!r} {error}.")
+                return
         told = item.fields
         if value.at is None and value.batch and not value.part:  # a batch is many parts: the next one may be as large
             told = told | {"file": self.content.stamp}
@@ -458,8 +414,8 @@ class _Reader:
             try:
                 if field_ == "key":
                     own = str(value)
-                else:
-                    body[field_] = form.value(field_, value)
+                elif (read := form.value(field_, value)) is not None:
+                    body[field_] = read
             except Unreadable as error:
                 column = self.settings.columns.get(field_, field_ if name == EVERY or "measured" in fields else name)
                 self._fault(line, column, f"{str(value)[:40]!r} {error}.")

@@ -155,7 +155,8 @@ def _mapped(
             for field, value in {**told, "measured": size}.items():
                 if field not in {"characteristic", "key"}:
                     wrong = f"{field} = {json.dumps(value, ensure_ascii=False)[:40]}"
-                    body[field] = form.value(field, "" if value is None else value)
+                    if (read := form.value(field, "" if value is None else value)) is not None:
+                        body[field] = read
         except Unreadable as error:
             yield Found(None, None, {}, f"{wrong} {error}.")
             continue

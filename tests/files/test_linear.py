@@ -70,7 +70,7 @@ def test_every_expression(name: str) -> None:
         lambda text: cell_values.moment(text, None),
         lambda text: cell_values.moment(text, None, "%d.%m.%Y %H:%M"),
         aqdef_times.time_of,
-        aqdef_times.slashed,
+        cell_values.slashed,
         aqdef_values.number_of,
         aqdef_values.process_of,
         aqdef_values._with_separators,

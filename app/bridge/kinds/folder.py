@@ -24,7 +24,8 @@ from pathlib import Path
 from typing import Final, NamedTuple, TypeVar
 
 from app.bridge.configuration import Machine
-from app.bridge.file_content import NAMES, NOT_ALONE, Content, Fault, Settings, read_content
+from app.bridge.file_content import NAMES, NOT_ALONE, Content, Settings, read_content
+from app.bridge.file_rows import Fault
 from app.bridge.links import STOPPING, Clock, ControlAway, Decided, Misconfigured, Order, Outcome, Position, Received
 from app.bridge.moments import learn_ahead
 from app.bridge.plain_files import NotPlain, is_plain, read_plain, write_new

@@ -157,7 +157,8 @@ class TextLink:
             if field in {"characteristic", "key"} or (value == "" and field != "measured"):
                 continue
             try:
-                body[field] = self._form.value(field, value)
+                if (read := self._form.value(field, value)) is not None:
+                    body[field] = read
             except Unreadable as error:
                 return self._refused(line, f"{field} {value[:40]!r} {error}.")
         if "key" in fields:

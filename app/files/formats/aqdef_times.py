@@ -2,16 +2,14 @@
 
 import re
 from datetime import UTC, datetime, timedelta, timezone
-from enum import Enum
 from functools import lru_cache
-from typing import Literal, cast
+from typing import cast
 from zoneinfo import ZoneInfo
 
-from app.files.formats.cell_values import Unreadable
+from app.files.formats.cell_values import DayOrder, Unreadable, at_hour, never_was
+from app.files.formats.file_times import DEFAULTS
 from app.language.i18n import _
 
-DayOrder = Literal["month_first", "day_first"]
-"""Which of the two comes first in dates with slashes."""
 _DATE = re.compile(
     r"(\d{1,4})([./-])(\d{1,2})\2(\d{1,4})\.?"
     r"(?:[/ .T]\s*(\d{1,2}):(\d{1,2})(?::(\d{1,2})(?:[.,](\d{1,9}))?)?(?:\s*([AaPp])\.?[Mm]\.?)?"
@@ -20,7 +18,7 @@ _DATE = re.compile(
 )
 _CENTURY = 70  # two digits from here on are of the last century
 _YEARS = range(1900, 2200)
-_DIGITS, _MONTHS = 2, 12
+_MONTHS = 12
 
 
 @lru_cache(maxsize=4096)
@@ -40,37 +38,23 @@ def time_of(text: str, order: DayOrder | None = None) -> datetime:
         raise Unreadable(_("is not a time; AQDEF writes it as 23.11.2026/06:05:00"))
     first, sign, second, third, hour, minute, seconds, fraction, half, offset = match.groups()
     year, month, day = _in_order(first, sign, second, third, order)
-    if year not in _YEARS:
-        raise Unreadable(_("is not a time: nothing was measured in the year {year}").format(year=year))
     hours = int(hour or 0)
     if half:
         hours = hours % 12 + (12 if half in "pP" else 0)
     try:
-        return datetime(
-            year,
-            month,
-            day,
-            hours,
-            int(minute or 0),
-            int(seconds or 0),
-            int((fraction or "0")[:6].ljust(6, "0")),
-            _zone(offset),
-        )
-    except ValueError as error:
+        at = at_hour(year, month, day, hours, int(minute or 0), int(seconds or 0), fraction)
+    except (ValueError, OverflowError) as error:
         raise Unreadable(_("is not a time: {error}").format(error=error)) from None
+    if year not in _YEARS and at.date() not in DEFAULTS:
+        raise Unreadable(_("is not a time: nothing was measured in the year {year}").format(year=year))
+    return at.replace(tzinfo=_zone(offset))
 
 
 def _in_order(first: str, sign: str, second: str, third: str, order: DayOrder | None) -> tuple[int, int, int]:
     """Year, month, day."""
     if len(first) > 2 or (sign == "-" and len(third) <= 2):
         return _year(first), int(second), int(third)
-    if sign == "/" and order != "day_first":
-        if order is None and int(first) > _MONTHS:
-            raise Unreadable(
-                _(
-                    "has no month {month}: dates with / are read as month/day/year; say it if the day comes first"
-                ).format(month=first)
-            )
+    if sign == "/" and order != "day_first" and (order or int(first) <= _MONTHS):
         return _year(third), int(first), int(second)
     return _year(third), int(second), int(first)
 
@@ -96,53 +80,36 @@ def day_order(day_first: bool | None) -> DayOrder | None:
     return None if day_first is None else "day_first" if day_first else "month_first"
 
 
-class Slashed(Enum):
-    """The readings that a date with strokes allows."""
-
-    MONTH_FIRST = 1
-    DAY_FIRST = 2
-    EITHER = 3
-    SAME = 4  # whichever comes first
-
-
-@lru_cache(maxsize=4096)
-def slashed(text: str) -> Slashed | None:
-    """The readings that a date allows; None where it has no strokes.
-
-    >>> slashed("3/14/2026 7:08"), slashed("3/4/2026 7:08"), slashed("3.4.2026/7:08")
-    (<Slashed.MONTH_FIRST: 1>, <Slashed.EITHER: 3>, None)
-    """
-    match = _DATE.fullmatch(text.strip())
-    if match is None or match[2] != "/" or len(match[1]) > _DIGITS:
-        return None
-    first, second = int(match[1]), int(match[3])
-    if first > _MONTHS:
-        return Slashed.DAY_FIRST
-    if second > _MONTHS:
-        return Slashed.MONTH_FIRST
-    return Slashed.SAME if first == second else Slashed.EITHER
-
-
 class WallClock:
     """The moments of wall-clock times in the order of a file.
 
-    When clocks go back an hour is there twice: a time of it that would lie before the one above it is of the second time. A
-    time that clocks leave out is of a clock that was not put forward yet.
+    When clocks go back an hour is there twice: a time of it that would lie before the one above it is of the second time;
+    `twice` counts those of that hour. A time that clocks leave out is refused.
     """
 
     def __init__(self, zone: ZoneInfo) -> None:
         self._zone = zone
         self._last: datetime | None = None
+        self.twice = 0
 
     def moment(self, local: datetime) -> datetime:
-        """The moment with its offset, of a time with or without one."""
+        """The moment with its offset, of a time with or without one. Raises `Unreadable`."""
         at = local if local.tzinfo is not None else self._in_zone(local)
-        self._last = at.astimezone(UTC)
+        try:
+            self._last = at.astimezone(UTC)
+        except OverflowError:
+            raise Unreadable(_("lies outside the years 1 to 9999")) from None
         return at
 
     def _in_zone(self, local: datetime) -> datetime:
         first, second = local.replace(tzinfo=self._zone, fold=0), local.replace(tzinfo=self._zone, fold=1)
         chosen = first
+        try:
+            if first.astimezone(UTC).astimezone(self._zone).replace(tzinfo=None) != local:
+                raise Unreadable(never_was(self._zone))
+        except OverflowError:
+            raise Unreadable(_("lies outside the years 1 to 9999")) from None
+        self.twice += first.utcoffset() != second.utcoffset()
         if first.utcoffset() != second.utcoffset() and self._last is not None:
             early, late = first.astimezone(UTC), second.astimezone(UTC)
             if early < self._last <= late:

@@ -11,8 +11,8 @@ from typing import NamedTuple
 from app.core.number_text import NotANumber, read_number
 from app.files.formats import aqdef
 from app.files.formats.aqdef import LINE, Description, Remark, Source, encoding_of, open_text
-from app.files.formats.aqdef_times import DayOrder, time_of
-from app.files.formats.cell_values import Unreadable
+from app.files.formats.aqdef_times import time_of
+from app.files.formats.cell_values import DayOrder, Unreadable
 from app.files.formats.delimited import Unusable
 from app.language.i18n import _
 

@@ -3,6 +3,7 @@
 import re
 import unicodedata
 from datetime import UTC, date, datetime, timedelta, timezone
+from enum import Enum
 from functools import lru_cache
 from typing import Literal, cast
 from zoneinfo import ZoneInfo, available_timezones
@@ -16,9 +17,53 @@ _DAY_FIRST = re.compile(
 _ISO = re.compile(
     r"\d{4}-\d{2}-\d{2}(?:[T ]\d{2}:\d{2}(?::\d{2}(?:[.,]\d{1,9})?)?)?(?:\s?(?:[Zz]|[+-]\d{2}(?::?\d{2})?))?"
 )
+_STROKES = re.compile(
+    r"(\d{1,2})/(\d{1,2})/(\d{4})"
+    r"(?:[\s,T]+(\d{1,2}):(\d{2})(?::(\d{2})(?:[.,](\d{1,6})\d*)?)?(?:\s*([AaPp])\.?[Mm]\.?)?)?"
+)
+_STROKED_DATE = re.compile(r"(\d{1,2})/(\d{1,2})/\d{2,4}(?!\d)", re.ASCII)
+_TWENTY_FOUR = re.compile(r"(?<=[T ])24(?=:00(?::00(?:[.,]0+)?)?(?:\s?(?:[Zz]|[+-]\d{2}(?::?\d{2})?))?$)")
 _COUNT = re.compile(
-    r"(days|seconds) since (1899-12-30|1904-01-01|1970-01-01)"
+    r"(days|seconds|milliseconds) since (1899-12-30|1904-01-01|1970-01-01)"
 )  # spreadsheets, old ones of the Mac, Unix
+_UNITS = {
+    "days": timedelta(days=1),
+    "seconds": timedelta(seconds=1),
+    "milliseconds": timedelta(milliseconds=1),
+}
+_MONTHS, _HOURS = 12, 24
+_DIGITS_OF_MILLISECONDS = 12  # before the decimal sign: of seconds it would be after the year 5138
+DayOrder = Literal["month_first", "day_first"]
+"""Which of the two comes first in dates with strokes."""
+
+
+class Slashed(Enum):
+    """The readings that a date with strokes allows."""
+
+    MONTH_FIRST = 1
+    DAY_FIRST = 2
+    EITHER = 3
+    SAME = 4  # whichever comes first
+
+
+@lru_cache(maxsize=4096)
+def slashed(text: str) -> Slashed | None:
+    """The readings that a date allows; None where it has no strokes, or begins with the year.
+
+    >>> slashed("3/14/2026 7:08"), slashed("3/4/2026 7:08"), slashed("3.4.2026/7:08")
+    (<Slashed.MONTH_FIRST: 1>, <Slashed.EITHER: 3>, None)
+    """
+    match = _STROKED_DATE.match(text.lstrip())
+    if match is None:
+        return None
+    first, second = int(match[1]), int(match[2])
+    if first > _MONTHS:
+        return Slashed.DAY_FIRST
+    if second > _MONTHS:
+        return Slashed.MONTH_FIRST
+    return Slashed.SAME if first == second else Slashed.EITHER
+
+
 _OPENING, _CLOSING = re.compile(r"[\[(<]"), re.compile(r"[\])>]")
 LONGEST_NAME = (
     1_000  # characters that are compared: Unicode sorts the accents of a letter in the square of their number
@@ -65,9 +110,14 @@ def _sign(character: str) -> str:
 
 
 def moment(
-    text: str, zone: ZoneInfo | None, pattern: str | None = None, *, fold: Literal[0, 1] | None = None
+    text: str,
+    zone: ZoneInfo | None,
+    pattern: str | None = None,
+    *,
+    fold: Literal[0, 1] | None = None,
+    order: DayOrder | None = None,
 ) -> datetime:
-    """A time with its offset: ISO 8601, day.month.year, or as `pattern` (strptime) says.
+    """A time with its offset: ISO 8601, day.month.year, or as `pattern` (strptime) says. order: of dates with strokes.
 
     A time that names no offset is one of `zone`; without a zone it is refused, because an hour more or less would put
     readings in another order. So is a time that is there twice because the clocks went back, unless `fold` says which is
@@ -76,10 +126,7 @@ def moment(
     >>> moment("21.11.2026 08:15:02", ZoneInfo("Europe/Belgrade")).isoformat()
     '2026-11-21T08:15:02+01:00'
     """
-    stripped = plain(text)
-    if not stripped:
-        raise Unreadable(_("is empty; every line needs a time, or none does"))
-    read = _by_pattern(stripped, pattern) if pattern else _by_shape(stripped)
+    read = naive(text, pattern, order)
     if read.tzinfo is not None:
         return read
     if zone is None:
@@ -90,7 +137,7 @@ def moment(
     except OverflowError:  # the first and the last day that a calendar knows
         raise Unreadable(_("lies outside the years 1 to 9999")) from None
     if there != read:
-        raise Unreadable(_("does not exist in {zone}: the clocks went forward in that hour").format(zone=zone.key))
+        raise Unreadable(never_was(zone))
     if fold is None and local.utcoffset() != local.replace(fold=1).utcoffset():
         raise Unreadable(
             _(
@@ -99,6 +146,26 @@ def moment(
         )
     # With its offset, not with the zone: moments of one zone are compared by their wall clocks, whatever the offsets are.
     return local.astimezone(timezone(cast("timedelta", local.utcoffset())))
+
+
+def never_was(zone: ZoneInfo) -> str:
+    """The reason against a time that the clocks of a zone left out, and what to do."""
+    return _(
+        "does not exist in {zone}: the clocks went forward in that hour. If the machine's clock was not put forward, name the "
+        "zone that it shows, such as Etc/GMT-1 for an hour ahead of UTC all year"
+    ).format(zone=zone.key)
+
+
+def naive(text: str, pattern: str | None = None, order: DayOrder | None = None) -> datetime:
+    """A time as it is written, without an offset unless it names one. Raises `Unreadable`.
+
+    >>> naive("18.11.2025 24:00:00").isoformat(), naive("11/18/2025 12:06:10 AM").isoformat()
+    ('2025-11-19T00:00:00', '2025-11-18T00:06:10')
+    """
+    stripped = plain(text)
+    if not stripped:
+        raise Unreadable(_("is empty; every line needs a time, or none does"))
+    return _by_pattern(stripped, pattern) if pattern else _by_shape(stripped, order)
 
 
 def day(text: str) -> date | None:
@@ -128,35 +195,75 @@ def _by_pattern(text: str, pattern: str) -> datetime:
 
 
 def _counted(text: str, pattern: str, count: re.Match[str]) -> datetime:
-    """A time as so many days of the calendar, or seconds of UTC, since a date."""
-    unit = timedelta(days=1) if count[1] == "days" else timedelta(seconds=1)
+    """A time as so many days of the calendar, or (milli)seconds of UTC, since a date."""
     try:
-        milliseconds = round(float(text.replace(",", ".")) * (unit / timedelta(milliseconds=1)))
+        milliseconds = round(float(text.replace(",", ".")) * (_UNITS[count[1]] / timedelta(milliseconds=1)))
         read = datetime.fromisoformat(count[2]) + timedelta(milliseconds=milliseconds)
     except (ValueError, OverflowError):
         raise Unreadable(_("does not have the form {pattern}").format(pattern=pattern)) from None
-    return read.replace(tzinfo=UTC) if count[1] == "seconds" else read
+    return read if count[1] == "days" else read.replace(tzinfo=UTC)
 
 
-def _by_shape(text: str) -> datetime:
+def at_hour(year: int, month: int, day: int, hour: int, minute: int, second: int, fraction: str | None) -> datetime:
+    """A time of the calendar; 24:00 is the midnight at the end of the day. Raises `ValueError`, `OverflowError`."""
+    microsecond = int((fraction or "0")[:6].ljust(6, "0"))
+    if hour == _HOURS and not minute and not second and not microsecond:
+        return datetime(year, month, day) + timedelta(days=1)  # noqa: DTZ001 - the zone is seen to by the caller
+    return datetime(year, month, day, hour, minute, second, microsecond)  # noqa: DTZ001 - as above
+
+
+def _by_shape(text: str, order: DayOrder | None) -> datetime:
     try:
         if _ISO.fullmatch(text):
-            return datetime.fromisoformat(text.replace(" +", "+").replace(" -", "-").replace(" Z", "Z"))
+            iso = text.replace(" +", "+").replace(" -", "-").replace(" Z", "Z")
+            midnight, twenty_four = _TWENTY_FOUR.subn("00", iso)
+            return datetime.fromisoformat(midnight) + timedelta(days=twenty_four)
         if match := _DAY_FIRST.fullmatch(text):
             day, month, year, hour, minute, second = (int(part or 0) for part in match.groups()[:6])
-            return datetime(year, month, day, hour, minute, second, int((match[7] or "0").ljust(6, "0")))  # noqa: DTZ001
-    except ValueError as error:
+            return at_hour(year, month, day, hour, minute, second, match[7])
+        if match := _STROKES.fullmatch(text):
+            return _with_strokes(text, match, order)
+    except (ValueError, OverflowError) as error:
+        if isinstance(error, Unreadable):
+            raise
         raise Unreadable(_("is not a time: {error}").format(error=error)) from None
     if re.fullmatch(r"[0-9.,]+", text):
+        if len(re.split("[.,]", text, maxsplit=1)[0]) >= _DIGITS_OF_MILLISECONDS:
+            raise Unreadable(
+                _("is a count of milliseconds; say from when on by a form of times: milliseconds since 1970-01-01")
+            )
         raise Unreadable(
             _(
                 "is a count of days or seconds and could mean several times; say which by a form of times: days since 1899-12-30 for "
                 "those of spreadsheets, or seconds since 1970-01-01"
             )
         )
-    if "/" in text:
+    raise Unreadable(
+        _(
+            "is not a time; write it as 2026-11-21T08:15:02+01:00 or 21.11.2026 08:15:02, or say the form of times "
+            "(--time-format), such as %d.%m.%y %H:%M:%S"
+        )
+    )
+
+
+def _with_strokes(text: str, match: re.Match[str], order: DayOrder | None) -> datetime:
+    readings = slashed(text)
+    if readings is Slashed.EITHER and order is None:
         raise Unreadable(_("could be day/month or month/day; say which by a form of times such as %d/%m/%Y %H:%M:%S"))
-    raise Unreadable(_("is not a time; write it as 2026-11-21T08:15:02+01:00 or 21.11.2026 08:15:02"))
+    first, second, year, hour, minute, seconds = (int(part or 0) for part in match.groups()[:6])
+    alone = {Slashed.DAY_FIRST: "day_first", Slashed.MONTH_FIRST: "month_first"}.get(readings or Slashed.SAME)
+    if alone and order and alone != order:
+        raise Unreadable(
+            _("has no month {month}, and other dates of the file begin with the other of day and month").format(
+                month=first if alone == "day_first" else second
+            )
+        )
+    if match[8]:
+        if not 1 <= hour <= _MONTHS:
+            raise Unreadable(_("is not a time: there is no hour {hour} with AM or PM").format(hour=hour))
+        hour = hour % 12 + (12 if match[8] in "pP" else 0)
+    month, day = (second, first) if (alone or order) == "day_first" else (first, second)
+    return at_hour(year, month, day, hour, minute, seconds, match[7])
 
 
 @lru_cache

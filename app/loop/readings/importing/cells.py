@@ -228,8 +228,8 @@ def _readers(layout: Layout) -> list[_Reader]:
         value = cell_values.number(text, "," if comma else decimal)
         return value if scale == 1.0 else round(value * scale, 9)
 
-    def time(text: str) -> datetime:
-        return cell_values.moment(text, zone, pattern)
+    def time(text: str) -> datetime | None:
+        return layout.times.moment(text, zone, pattern)
 
     def whole(text: str) -> int | None:
         if text and not (text.isascii() and text.isdigit()):
@@ -323,6 +323,6 @@ def _converted(values: dict[str, Any], layout: Layout, number: int) -> Iterator[
     for name in ("measured_at", "machined_at"):
         if isinstance(values.get(name), str):
             try:
-                values[name] = cell_values.moment(values[name], layout.zone, layout.time_format)
+                values[name] = layout.times.moment(values[name], layout.zone, layout.time_format)
             except Unreadable as error:
                 yield Flaw(number, layout.named(name), shown(values[name]), str(error))

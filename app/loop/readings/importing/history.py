@@ -38,6 +38,7 @@ from app.loop.readings.writer.statements import as_json
 from app.loop.tables.tools import AverageMemory
 
 Progress = Callable[[], None]
+NAMED_LINES = 4
 
 STAGE = """
 CREATE TEMPORARY TABLE staged (line bigint, key text, measured float8, deviation float8, average_before float8,
@@ -152,17 +153,23 @@ class Summary:
     zones: dict[str, int] = field(default_factory=dict)
     first_at: datetime | None = None
     last_at: datetime | None = None
+    untimed: list[int] = field(default_factory=list)  # lines without a time, the first of them
+    untimed_count: int = 0
     first_sequence: int | None = None
     last_sequence: int | None = None
     passed: dict[str, list[int]] = field(default_factory=dict)
 
     @property
     def notes(self) -> list[str]:
-        """Sentences on lines that were passed over."""
-        return [
+        """Sentences on lines that were passed over, and on those without a time; of a file without any the layout says so."""
+        texts = [
             _("{lines}: {reason}; passed over.").format(lines=lines_of(each), reason=why)
             for why, each in self.passed.items()
         ]
+        if 0 < self.untimed_count < self.lines:
+            named = lines_of(self.untimed, self.untimed_count)
+            texts.append(_("{lines}: no time; it is that of the line above.").format(lines=named))
+        return texts
 
 
 @dataclass
@@ -173,6 +180,7 @@ class _Judge:
     empirical_value: float
     now: datetime
     average: float = 0.0
+    time_above: datetime | None = None  # of the newest line that has one: also that of lines below it that have none
 
     def row(self, line: Line) -> tuple[Any, ...] | Flaw:
         reading, parameters = line.reading, self.parameters
@@ -192,6 +200,7 @@ class _Judge:
             accepted=results is None or not results.rejected,
         )
         self.average = decision.average_after
+        self.time_above = reading.measured_at or self.time_above
         return (
             line.number,
             reading.key,
@@ -199,7 +208,7 @@ class _Judge:
             decision.deviation,
             decision.average_before,
             decision.average_after,
-            reading.measured_at or self.now,
+            reading.measured_at or self.time_above or self.now,
             reading.machined_at,
             decision.zone.value,
             reading.part,
@@ -286,6 +295,9 @@ def _stage(cursor: Cursor[Any], lines: Iterable[Line | Flaw | Passed], judge: _J
                 continue
             copy.write_row(row)
             _count(summary, row)
+            if isinstance(line, Line) and line.reading.measured_at is None:
+                summary.untimed_count += 1
+                summary.untimed += [line.number] if len(summary.untimed) < NAMED_LINES else []
         if wrong:
             raise Flawed(flaws, wrong)
     if not summary.lines:

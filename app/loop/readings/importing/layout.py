@@ -2,7 +2,7 @@
 
 import json
 import sys
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import accumulate, chain, islice
 from pathlib import Path
@@ -11,7 +11,9 @@ from zoneinfo import ZoneInfo
 
 from app.errors import FieldError, Invalid
 from app.files.formats import cell_values, delimited, spreadsheet
+from app.files.formats.cell_values import slashed
 from app.files.formats.delimited import Row, Unusable
+from app.files.formats.file_times import FileTimes, times_of
 from app.files.formats.units import LENGTHS, UnknownUnit, unit_in
 from app.language.i18n import _
 from app.loop.readings.origin import COLUMNS
@@ -88,6 +90,7 @@ class Layout:
     first_line: int = 2  # from here on lines are readings
     last_line: int | None = None  # below are sums and means
     missing: frozenset[str] = frozenset()
+    times: FileTimes = FileTimes()  # noqa: RUF009 - a tuple
     skips_blank: bool = False  # a row without the measured value says nothing: another column of a wide sheet has one
 
     @property
@@ -208,9 +211,9 @@ def _csv_layout(path: Path, wishes: Wishes, zone: ZoneInfo | None, kind: str = "
     place = columns.get("measured", (0,))[0]
     # Where no column is the measured one, it may be any of them, or several.
     only = slice(place, place + 1) if "measured" in columns else slice(None)
-    below = (row for row in chain(top, islice(rows, 200)) if row.line >= first_line)
+    below = [row for row in chain(top, islice(rows, 200)) if row.line >= first_line]
     sample = [cell for row in below for cell in row.cells[only]]
-    return Layout(
+    layout = Layout(
         kind=kind,
         header=header,
         columns=columns,
@@ -225,6 +228,27 @@ def _csv_layout(path: Path, wishes: Wishes, zone: ZoneInfo | None, kind: str = "
         last_line=wishes.last_line,
         missing=wishes.missing,
     )
+    return replace(layout, times=_times(layout, below, rows))
+
+
+def _times(layout: Layout, begin: Sequence[Row], rest: Iterator[Row]) -> FileTimes:
+    """Common properties of the times of the file; of all lines only where dates with strokes leave the order open."""
+    places = layout.columns.get("measured_at", ())
+    if not places:
+        return FileTimes()
+
+    def written(rows: Iterable[Row]) -> Iterator[str]:
+        return (text_of(row, places) for row in rows)
+
+    found = times_of(written(begin), layout.time_format)
+    if found.order is not None or not any(slashed(text) for text in written(begin)):
+        return found
+    return times_of(written(chain(begin, rest)), layout.time_format)
+
+
+def text_of(row: Row, places: Sequence[int]) -> str:
+    """The cells at these places as one text; a row may be shorter than the header."""
+    return " ".join(row.cells[place] for place in places if place < len(row.cells)).strip()
 
 
 def rows_of(path: Path, layout: Layout) -> Iterator[Row | Unusable]:
@@ -291,7 +315,8 @@ def _filled(row: Row) -> set[int]:
 
 def _json_layout(path: Path, wishes: Wishes, zone: ZoneInfo | None, *, is_list: bool) -> Layout:
     names: dict[str, None] = {}
-    for value in _first_values(path, is_list=is_list):
+    values = _first_values(path, is_list=is_list)
+    for value in values:
         if isinstance(value, dict):
             names.update(dict.fromkeys(map(str, value)))
             _refuse_wide(len(names))
@@ -300,7 +325,14 @@ def _json_layout(path: Path, wishes: Wishes, zone: ZoneInfo | None, *, is_list: 
         raise wrong("file", _("The file holds no JSON objects."))
     columns = _columns(header, wishes.mapping)
     unit = unit_of(header[columns["measured"][0]] if "measured" in columns else "", wishes.unit)
-    return Layout("list" if is_list else "lines", header, columns, unit=unit, zone=zone, time_format=wishes.time_format)
+    layout = Layout(
+        "list" if is_list else "lines", header, columns, unit=unit, zone=zone, time_format=wishes.time_format
+    )
+    if "measured_at" not in columns:
+        return layout
+    name = layout.named("measured_at")
+    texts = (value.get(name) for value in values if isinstance(value, dict))
+    return replace(layout, times=times_of((text for text in texts if isinstance(text, str)), wishes.time_format))
 
 
 def _first_values(path: Path, *, is_list: bool, most: int = 200) -> list[Any]:

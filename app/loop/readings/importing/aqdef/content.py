@@ -56,15 +56,28 @@ class Readings:
         if self.found.without_time:
             texts.append(
                 ngettext(
-                    "%(num)d value has no time (K0004): it gets the time of this import.",
-                    "%(num)d values have no time (K0004): they get the time of this import.",
+                    "%(num)d value has no time (K0004): it gets that of the value above, or of this import where none has any.",
+                    "%(num)d values have no time (K0004): each gets that of the value above, or of this import where none has any.",
                     self.found.without_time,
                 )
                 % {"num": self.found.without_time}
             )
+        if self.found.twice:
+            texts.append(
+                ngettext(
+                    "%(num)d value lies in the hour that is there twice, because the clocks went back: the order of the file decides.",
+                    "%(num)d values lie in the hour that is there twice, because the clocks went back: the order of the file decides.",
+                    self.found.twice,
+                )
+                % {"num": self.found.twice}
+            )
         if self.found.month_first:
             texts.append(
                 _("Dates with / are read as month/day/year, as {date} says.").format(date=repr(self.found.month_first))
+            )
+        if self.found.day_first and not self.found.month_first:
+            texts.append(
+                _("Dates with / are read as day/month/year, as {date} says.").format(date=repr(self.found.day_first))
             )
         if missing := sum(self.found.missing.values()):
             texts.append(

@@ -8,8 +8,7 @@ from app.db.engine import Database
 from app.errors import InbandError
 from app.files.formats import cell_values
 from app.files.formats.aqdef import Description, Source
-from app.files.formats.aqdef_times import DayOrder
-from app.files.formats.cell_values import Unreadable
+from app.files.formats.cell_values import DayOrder, Unreadable
 from app.files.formats.delimited import ENCODINGS
 from app.files.formats.units import LENGTHS
 from app.language.times import plant_zone

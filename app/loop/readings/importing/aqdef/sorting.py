@@ -18,13 +18,16 @@ from app.files.formats import aqdef, aqdef_values
 from app.files.formats.aqdef import Description, Remark, Source
 from app.files.formats.aqdef_context import context_of
 from app.files.formats.aqdef_keys import Keys
-from app.files.formats.aqdef_times import DayOrder, Slashed, WallClock, slashed
+from app.files.formats.aqdef_times import WallClock, time_of
 from app.files.formats.aqdef_values import Value
+from app.files.formats.cell_values import DayOrder, Slashed, Unreadable, slashed
+from app.files.formats.file_times import FileTimes, times_of
 from app.files.formats.repeats import Repeats
 from app.language.i18n import _
 from app.loop.readings.importing.cells import MOST_FLAWS, Flaw, fingerprint
 from app.loop.readings.origin import EMPIRICAL, Origin, named_by
 
+SAMPLE = 250  # values whose times say what the file means by them
 AT_ONCE = 20_000  # readings in memory before they are put down
 
 
@@ -66,6 +69,8 @@ class Sorted:
     missing: Counter[int] = field(default_factory=Counter)
     without_time: int = 0
     month_first: str = ""  # a date with strokes that can only be read so
+    day_first: str = ""  # the same
+    twice: int = 0  # in the hour that is there twice
     flaws: list[Flaw] = field(default_factory=list)
     flaw_count: int = 0
     remarks: Repeats = field(default_factory=Repeats)
@@ -103,7 +108,8 @@ class _Sorter:
         self._folder = folder
         self._readings = Sorted()
         self._wanted = wanted
-        self._wishes = wishes
+        self._order = wishes.order
+        self._times = FileTimes()
         self._mark = mark
         self._clocks = {index: WallClock(wishes.zone) for index in wanted}
         self._keys = Keys()
@@ -116,6 +122,12 @@ class _Sorter:
         self, source: Source, most: int | None, spend: Callable[[int], None], progress: Callable[[], None]
     ) -> Sorted:
         readings, waiting = self._readings, 0
+        begin = islice(aqdef_values.values(source, self._description), SAMPLE)
+        texts = [value.fields.get("K0004", "") for value in begin if not isinstance(value, Remark)]
+        self._times = times_of(texts, read=time_of)
+        if self._order is None and self._times.order == "day_first":
+            self._order = "day_first"
+            readings.day_first = next(text for text in texts if slashed(text) is Slashed.DAY_FIRST)
         for value in islice(aqdef_values.values(source, self._description), most):
             progress()
             if isinstance(value, Remark):
@@ -127,7 +139,8 @@ class _Sorter:
                     self._write(spend)
                     waiting = 0
         self._write(spend)
-        if self._doubtful and not readings.month_first:
+        readings.twice = sum(clock.twice for clock in self._clocks.values())
+        if self._doubtful and (readings.day_first or not readings.month_first):
             readings.flaws += self._doubtful[: MOST_FLAWS - len(readings.flaws)]
             readings.flaw_count += self._doubtful_count
         return readings
@@ -138,6 +151,8 @@ class _Sorter:
         match slashed(text):
             case Slashed.MONTH_FIRST:
                 self._readings.month_first = self._readings.month_first or text
+            case Slashed.DAY_FIRST:
+                self._readings.day_first = self._readings.day_first or text
             case Slashed.EITHER:
                 self._doubtful_count += 1
                 if len(self._doubtful) < MOST_FLAWS:
@@ -163,22 +178,28 @@ class _Sorter:
 
     def _kept(self, value: Value) -> Kept | None:
         readings, index, content = self._readings, value.characteristic, self._wanted[value.characteristic]
-        read = aqdef_values.read_value(value, self._wishes.order)
+        read = aqdef_values.read_value(value, self._order)
         if isinstance(read, Remark):
             self._remark(read)
             return None
         if read is None:
             readings.missing[index] += 1
             return None
+        try:
+            read = read._replace(at=None if read.at is None else self._times.settled(read.at))
+            at = self._clocks[index].moment(read.at) if read.at is not None else None
+        except Unreadable as error:
+            place, text = f"K0004/{index}", value.fields.get("K0004", "")
+            self._remark(Remark(value.line, place, text[:40], str(error), wrong=True))
+            return None
         measured = read.measured if content.scale == 1.0 else round(read.measured * content.scale, 9)
         if read.at is None:
             key = f"file:{self._mark}:{value.line}"
         else:
             key = self._keys.of(value, content.identity, measured, read.at)
-        at = self._clocks[index].moment(read.at) if read.at is not None else None
         readings.counted[index] += 1
         readings.without_time += at is None
-        if self._wishes.order is None:
+        if self._order is None:
             self._look_at_date(value)
         if read.attribute:
             readings.excluded.setdefault(index, {}).setdefault(read.attribute, []).append(key)

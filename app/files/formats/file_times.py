@@ -1,0 +1,100 @@
+"""Times of a whole file: what one line leaves open, the others of the file settle; and lines that have no time.
+
+Which comes first in dates with strokes, day or month, is said by a date that can be read one way only. An empty time among
+others, or one that programs write where they have none, is no time.
+"""
+
+from collections.abc import Callable, Iterable
+from datetime import date, datetime, time, timedelta
+from typing import NamedTuple
+from zoneinfo import ZoneInfo
+
+from app.files.formats.cell_values import DayOrder, Slashed, Unreadable, moment, naive, slashed
+from app.language.i18n import _
+
+DEFAULTS = frozenset(
+    date(*day) for day in ((1, 1, 1), (1899, 12, 30), (1899, 12, 31), (1900, 1, 1), (1904, 1, 1), (1970, 1, 1))
+)
+"""Days that programs write where they have none, some of them with a time of day."""
+MIDNIGHTS = frozenset({date(2000, 1, 1)})
+"""Days of which only the midnight is one: a clock that was never set begins there."""
+FAR = timedelta(days=366)
+
+
+def default_of(at: datetime) -> date | None:
+    """The day that a program has written for no time; None of a time that may be one."""
+    day = at.date()
+    return day if day in DEFAULTS or (day in MIDNIGHTS and at.time() == time()) else None
+
+
+class FileTimes(NamedTuple):
+    """Common properties of the times of a file. order: of day and month. dated: there are times at all.
+
+    absent: days of programs that lie far from every time of the file, so that they mean no time.
+    """
+
+    order: DayOrder | None = None
+    dated: bool = False
+    absent: frozenset[date] = frozenset()
+
+    def moment(self, text: str, zone: ZoneInfo | None, pattern: str | None = None) -> datetime | None:
+        """The time in a cell; None where it has none. Raises `Unreadable`."""
+        if self.dated and not text.strip():
+            return None
+        if self.settled(naive(text, pattern, self.order)) is None:
+            return None
+        return moment(text, zone, pattern, order=self.order)
+
+    def settled(self, at: datetime) -> datetime | None:
+        """The time, as a file writes it; None where it means none. Raises `Unreadable` where the file has no other."""
+        day = default_of(at)
+        if day is not None and not self.dated:
+            raise Unreadable(
+                _("is what programs write where they have no time; correct it, or leave the column of times out")
+            )
+        return None if day in self.absent else at
+
+    @property
+    def live(self) -> "FileTimes":
+        """The same for readings that come in as they are measured: one without a time is measured now."""
+        return self if self.dated else LIVE._replace(order=self.order)
+
+
+LIVE = FileTimes(dated=True, absent=DEFAULTS | MIDNIGHTS)
+Read = Callable[[str, DayOrder], datetime]
+
+
+def times_of(texts: Iterable[str], pattern: str | None = None, read: Read | None = None) -> FileTimes:
+    """Common properties of these times of a file; what is none is passed over. read: of a format that writes times in its own way.
+
+    >>> times_of(["11/7/2025 6:05", "", "11/18/2025 6:06"]).order
+    'month_first'
+    >>> [day.year for day in sorted(times_of(["7.5.1999", "1.1.1970 00:00:00"]).absent)]
+    [1, 1899, 1899, 1900, 1904, 1970]
+    """
+    orders: set[DayOrder] = set()
+    days: set[date] = set()
+    for text in texts:
+        stroke = None if pattern else slashed(text)
+        if stroke in (Slashed.DAY_FIRST, Slashed.MONTH_FIRST):
+            orders.add("day_first" if stroke is Slashed.DAY_FIRST else "month_first")
+        try:
+            order: DayOrder = "month_first" if stroke is Slashed.MONTH_FIRST else "day_first"
+            at = naive(text, pattern, order) if read is None else read(text, order)
+        except Unreadable:
+            continue
+        if default_of(at) is None:
+            days.add(at.date())
+    if not days:
+        return FileTimes(_only(orders))
+    absent = (day for day in DEFAULTS | MIDNIGHTS if not _within(day, min(days), max(days)))
+    return FileTimes(_only(orders), dated=True, absent=frozenset(absent))
+
+
+def _only(orders: set[DayOrder]) -> DayOrder | None:
+    return next(iter(orders)) if len(orders) == 1 else None
+
+
+def _within(day: date, earliest: date, latest: date) -> bool:
+    """Tell if a day may be one of the file: in its time, or within a year of it."""
+    return earliest - day < FAR and day - latest < FAR
