@@ -106,12 +106,22 @@ def mm(size_mm: float | None, decimals: int = 4) -> str:
 
 
 def percent(share: float | None, decimals: int = 0) -> str:
-    r"""A share of 1 in per cent.
+    r"""A share of 1 in per cent; what is less than all is not rounded to 100, nor what is more than nothing to 0.
 
-    >>> percent(0.956), percent(0.0314, 1)
-    ('96\xa0%', '3.1\xa0%')
+    >>> percent(0.956), percent(0.0314, 1), percent(0.9996), percent(0.0004, 1)
+    ('96\xa0%', '3.1\xa0%', '99\xa0%', '<0.1\xa0%')
     """
-    return NOTHING if share is None else f"{fixed(share * 100, decimals)}{NO_BREAK_SPACE}%"
+    return NOTHING if share is None else f"{in_percent(share, decimals)}{NO_BREAK_SPACE}%"
+
+
+def in_percent(share: float, decimals: int = 0) -> str:
+    """The same without its unit."""
+    step = 10.0**-decimals
+    if 0 < share < 1:
+        if round(share * 100, decimals) == 0:
+            return f"<{fixed(step, decimals)}"
+        share = min(share, 1 - step / 100)
+    return fixed(share * 100, decimals)
 
 
 def as_typed(value: float | None, decimals: int = 9) -> str:

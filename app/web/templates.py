@@ -58,6 +58,8 @@ def environment() -> Environment:
         plain_um=numbers.plain_um,
         signed=numbers.signed,
         fixed=numbers.fixed,
+        percent=numbers.percent,
+        in_percent=numbers.in_percent,
         short=numbers.short,
         when=numbers.when,
         as_field=period.field,

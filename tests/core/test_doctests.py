@@ -9,11 +9,20 @@ import pytest
 import app.core
 
 MODULES = sorted(module.name for module in pkgutil.walk_packages(app.core.__path__, "app.core."))
+FILES = [f"app.files.formats.{name}" for name in ("cell_values", "file_times", "periods", "repeats")]
 
 
 @pytest.mark.parametrize(
     "name",
-    ["app.core", *MODULES, "app.db.binaries", "app.language.numbers", "app.views.licences.libraries", "app.web.paging"],
+    [
+        "app.core",
+        *MODULES,
+        "app.db.binaries",
+        *FILES,
+        "app.language.numbers",
+        "app.views.licences.libraries",
+        "app.web.paging",
+    ],
 )
 def test_examples_answer_as_printed(name: str) -> None:
     failed, _tried = doctest.testmod(importlib.import_module(name))

@@ -13,7 +13,7 @@ from typing import Any, Literal
 from zoneinfo import ZoneInfo
 
 from app.language.i18n import _
-from app.language.numbers import MINUS, NO_BREAK_SPACE, NOTHING, signed
+from app.language.numbers import MINUS, NO_BREAK_SPACE, NOTHING, in_percent, signed
 from app.language.times import written
 
 Kind = Literal["text", "count", "deviation", "width", "size", "number", "probability", "share", "moment"]
@@ -88,7 +88,7 @@ class Value:
             case "count":
                 return f"{number:,}".replace(",", NO_BREAK_SPACE).replace("-", MINUS)
             case "share":  # 99.96 % is not all of them; 99.79 % is 99.8 %
-                text = f"{number if number >= 100 else min(number, 99.9):.1f}"
+                text = in_percent(number / 100, 1)
             case "deviation":
                 text = signed(number, self.decimals)
             case _:

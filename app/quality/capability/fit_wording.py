@@ -3,7 +3,7 @@
 from app.core.spc.distributions import Family
 from app.core.spc.fitting import FITS, Choice, Fit, Fitted, why
 from app.language.i18n import _
-from app.language.numbers import fixed
+from app.language.numbers import fixed, in_percent
 
 
 def name(family: Family) -> str:
@@ -38,8 +38,8 @@ def parameters(fit: Fit) -> str:
             return _("shape {shape}, scale {scale} µm").format(shape=fixed(p["shape"], 2), scale=um("scale"))
         case Family.TWO_NORMALS:
             return _("{share} % at {first} ± {one} µm, {rest} % at {second} ± {other} µm").format(
-                share=f"{p['share'] * 100:.0f}",
-                rest=f"{100 - round(p['share'] * 100):.0f}",
+                share=in_percent(p["share"]),
+                rest=in_percent(1 - p["share"]),
                 first=um("first_mean"),
                 second=um("second_mean"),
                 one=um("first_sigma"),
