@@ -100,10 +100,14 @@ Text200 = Annotated[
 ]
 """A name: one line, 1 to 200 characters."""
 
+CHOSEN = "one of some likely ones, and what is typed besides as `more`"
+"""How a form asks for a field."""
+
 Reason = Annotated[
     str,
     StringConstraints(strip_whitespace=True, min_length=1, max_length=1000),
     AfterValidator(_readable),
+    CHOSEN,
     Field(description="Why, in words; it stays on record."),
 ]
 """Reason for an action: 1 to 1000 characters."""

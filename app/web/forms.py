@@ -1,13 +1,16 @@
 """Forms that people send: read by the same schemas as JSON, and shown again with everything they typed."""
 
 from collections.abc import Iterable, Mapping
-from typing import Any, TypeVar
+from types import UnionType
+from typing import Annotated, Any, TypeVar, Union, get_args, get_origin
 
 from pydantic import BaseModel, ValidationError
+from pydantic.fields import FieldInfo
 
 from app.core.number_text import number_or_none
 from app.errors import FieldError, InbandError, Invalid
 from app.language.i18n import _
+from app.web.fields import CHOSEN
 from app.web.validation import field_errors
 
 Schema = TypeVar("Schema", bound=BaseModel)
@@ -21,6 +24,38 @@ def parsed(schema: type[Schema], fields: Mapping[str, Any]) -> Schema:
     except ValidationError as error:
         errors = [FieldError(field, message) for field, message in field_errors(error.errors())]
         raise Invalid(_("The form has to be corrected."), errors=errors) from None
+
+
+def typed(schema: type[Schema], form: Mapping[str, str]) -> Schema:
+    """The form as the API's schema: each field that bears a name of the schema is read as its type says. Raises `Invalid`.
+
+    A length with comma or minus as people type it, whole numbers between commas, a tick, a reason chosen or in own words (`words`).
+    """
+    return parsed(schema, {name: _read(form, name, field) for name, field in schema.model_fields.items()})
+
+
+def _read(form: Mapping[str, str], name: str, field: FieldInfo) -> Any:
+    text = form.get(name, "").strip()
+    if CHOSEN in field.metadata:
+        return words(form, name)
+    kinds = _kinds(field.annotation)
+    if bool in kinds:
+        return text == "true" or None
+    if list in kinds:
+        return whole_numbers(text)
+    if float in kinds:
+        return length(text)
+    return whole(text) if int in kinds else text
+
+
+def _kinds(annotation: Any) -> set[Any]:
+    """The plain types of an annotation, without the rules beside them: {float, NoneType} of an optional length."""
+    origin = get_origin(annotation)
+    if origin is Annotated:
+        return _kinds(get_args(annotation)[0])
+    if origin in (Union, UnionType):
+        return {kind for each in get_args(annotation) for kind in _kinds(each)}
+    return {origin or annotation}
 
 
 def by_field(error: InbandError) -> dict[str, str]:

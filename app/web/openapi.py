@@ -10,6 +10,7 @@ from collections.abc import Iterable, Iterator, Mapping
 from typing import Any
 
 from fastapi import FastAPI
+from fastapi.dependencies.models import Dependant
 from fastapi.openapi.utils import get_openapi
 from fastapi.routing import APIRoute, iter_route_contexts
 
@@ -240,13 +241,20 @@ def _roles(app: FastAPI) -> Iterator[tuple[str, tuple[str, bool]]]:
             continue
         roles = {
             dependency.call.__name__.removeprefix("require_")
-            for dependency in route.dependant.dependencies
+            for dependency in _all_dependencies(route.dependant)
             if dependency.call is not None and dependency.call.__name__.startswith("require_")
         }
         if roles:
             yield route.name, (roles.pop(), False)
         else:  # any caller; the route itself then looks for the role at the machine in question
             yield route.name, ("viewer" if route.methods == {"GET"} else "operator", True)
+
+
+def _all_dependencies(of: Dependant) -> Iterator[Dependant]:
+    """Those of a route, and those that find what it acts on."""
+    for dependency in of.dependencies:
+        yield dependency
+        yield from _all_dependencies(dependency)
 
 
 def _tidy(part: Any) -> None:

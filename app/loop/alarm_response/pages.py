@@ -8,9 +8,8 @@ from fastapi import APIRouter, Query, Request, Response
 from starlette.responses import RedirectResponse
 
 from app.access.deps import Caller, Operator, Viewer, require
-from app.errors import Conflict, Invalid
-from app.loop.alarm_response import queries, wording
-from app.loop.alarm_response.form_reader import acknowledge_as_typed
+from app.errors import Invalid
+from app.loop.alarm_response import queries, verbs, wording
 from app.loop.alarm_response.outcomes import outcomes
 from app.loop.alarm_response.queries import AlarmRow
 from app.loop.machines import queries as machines
@@ -120,11 +119,7 @@ def acknowledge(request: Request, session: SessionDep, caller: Operator, number:
     """The second touch. Sent twice, or after somebody else, it changes nothing and says so."""
     machine = form.get("machine") or None
     try:
-        acknowledge_as_typed(session, number, form, caller)
-    except Conflict:
-        alarm = queries.alarm(session, number).alarm
-        again = alarm.acknowledged_by == caller.name and alarm.action == form.get("action")
-        return RedirectResponse(address("/alarms", machine=machine, **{"done" if again else "late": number}), 303)
+        outcome = verbs.acknowledge(session, number, form, caller)
     except Invalid as error:
         return _alarm(request, queries.alarm(session, number), caller, form.get("action"), machine, form, error)
-    return RedirectResponse(address("/alarms", machine=machine, done=number), 303)
+    return RedirectResponse(address("/alarms", machine=machine, **{outcome.kind: number}), 303)

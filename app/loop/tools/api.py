@@ -11,18 +11,16 @@ from app.loop.machines.queries import hold_machine, machine_for, machine_named
 from app.loop.timeline.figures import MANUAL_EDIT, TOOL_CHANGE
 from app.loop.timeline.queries import with_events_of_machine
 from app.loop.tools import actions, applying, gain_queries, queries, wording
+from app.loop.tools.actions import Decided
 from app.loop.tools.figures import OffsetChange, offset_figure
 from app.loop.tools.schemas import (
-    AppliedIn,
     AverageOut,
     AverageSet,
-    CorrectionDecisionIn,
     CorrectionOut,
     DecisionsIn,
     EmpiricalValueIn,
     OffsetReportIn,
     OffsetReportOut,
-    RejectionIn,
     Status,
     ToolChange,
     ToolEdit,
@@ -34,10 +32,12 @@ from app.loop.tools.schemas import (
     tool_out,
     tool_set,
 )
+from app.loop.tools.verbs import CORRECTION, OfCorrection
 from app.web.api import FIGURE, Limit, MachineKey, SerialAfter, Theme, api_router, chart_answer, problems
 from app.web.deps import DoorSessionDep, SessionDep
 from app.web.etags import TAGGED, guarded, tagged
 from app.web.fields import Page, page_of
+from app.web.verb import draw
 
 router = api_router("offsets")
 DRAWN = (TOOL_CHANGE, MANUAL_EDIT)  # events of the offset's own chart
@@ -210,50 +210,21 @@ def get_correction(session: DoorSessionDep, caller: AnyCaller, machine: MachineK
     return correction_out(queries.row_of(session, machine_row, queries.correction(session, machine_row, number)))
 
 
-@router.post("/corrections/{machine}/{number}/applied", responses=problems(404, 409))
-def mark_applied(
-    session: DoorSessionDep, caller: AnyCaller, machine: MachineKey, number: Number, applied: AppliedIn | None = None
-) -> CorrectionOut:
-    """Confirm that the correction is in the offset now. Confirming twice is harmless.
-
-    An `offset_after` that differs from `offset_expected` by more than 0.0005 mm raises the alarm *offset differs*: nothing
-    is corrected through this tool until somebody has said which offset is true. If it is the offset that later pending
-    corrections of the tool lead to, those are confirmed with this one.
-    """
-    machine_row = machine_for(session, caller, machine, "operator")
-    confirmation = applied or AppliedIn()
-    done = applying.mark_applied(
-        session,
-        machine_row,
-        number,
-        caller,
-        offset_after=confirmation.offset_after,
-        applied_at=confirmation.applied_at,
-        mapping=confirmation.mapping,
-    )
-    return correction_out(queries.row_of(session, machine_row, done.correction), done.note)
+def _of_machine(session: DoorSessionDep, caller: AnyCaller, machine: MachineKey, number: Number) -> OfCorrection:
+    return OfCorrection(session, machine_for(session, caller, machine, "operator"), number, caller)
 
 
-@router.post("/corrections/{machine}/{number}/rejected", responses=problems(404, 409))
-def reject_correction(
-    session: DoorSessionDep, caller: AnyCaller, machine: MachineKey, number: Number, decision: RejectionIn
-) -> CorrectionOut:
-    """It will not be applied: the machine refuses the offset, or a person decides against it."""
-    machine_row = machine_for(session, caller, machine, "operator")
-    done = actions.decide(
-        session, machine_row, number, "rejected", decision.reason, caller, although_fetched=decision.although_fetched
-    )
-    return correction_out(queries.row_of(session, machine_row, done.correction), done.note)
+def _of_person(session: SessionDep, caller: Operator, machine: MachineKey, number: Number) -> OfCorrection:
+    return OfCorrection(session, machine_named(session, machine), number, caller)
 
 
-@router.post("/corrections/{machine}/{number}/approve", responses=problems(404, 409))
-def approve_correction(
-    session: SessionDep, caller: Operator, machine: MachineKey, number: Number, decision: CorrectionDecisionIn
-) -> CorrectionOut:
-    """A person approves a correction that awaits it; the machine may apply it then."""
-    machine_row = machine_named(session, machine)
-    done = actions.decide(session, machine_row, number, "approve", decision.reason, caller)
-    return correction_out(queries.row_of(session, machine_row, done.correction), done.note)
+def _decided(on: OfCorrection, done: Decided) -> CorrectionOut:
+    return correction_out(queries.row_of(on.session, on.machine, done.correction), done.note)
+
+
+for _verb in CORRECTION:
+    _subject = _of_machine if _verb.by_machine else _of_person
+    draw(router, f"/corrections/{{machine}}/{{number}}/{_verb.name}", _verb, _subject, _decided, CorrectionOut)
 
 
 @router.post("/corrections/{machine}/approve", responses=problems(404, 409))
@@ -267,13 +238,3 @@ def approve_corrections(
     machine_row = machine_named(session, machine)
     approved = actions.approve_all(session, machine_row, decision.numbers, decision.reason, caller)
     return Page(items=[correction_out(row) for row in queries.rows_of(session, machine_row, approved)])
-
-
-@router.post("/corrections/{machine}/{number}/release", responses=problems(404, 409))
-def release_correction(
-    session: SessionDep, caller: Operator, machine: MachineKey, number: Number, decision: CorrectionDecisionIn
-) -> CorrectionOut:
-    """A person releases a held correction; the machine may apply it then. Its alarm stays until it is acknowledged."""
-    machine_row = machine_named(session, machine)
-    done = actions.decide(session, machine_row, number, "release", decision.reason, caller)
-    return correction_out(queries.row_of(session, machine_row, done.correction), done.note)

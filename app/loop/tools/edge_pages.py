@@ -12,7 +12,7 @@ from app.errors import Invalid
 from app.language.i18n import _
 from app.language.numbers import as_typed
 from app.loop.machines.queries import machine_named
-from app.loop.tools import confirmation, queries, wording
+from app.loop.tools import queries, verbs, wording
 from app.loop.tools.edge_schemas import ToolSettings
 from app.loop.tools.edges import describe_tool
 from app.loop.tools.lives_queries import lives
@@ -35,7 +35,7 @@ def tool_page(
     done: Annotated[str | None, Query(max_length=40)] = None,
 ) -> Response:
     """One location of the tool memory with everything about it."""
-    return _tool(request, session, machine, number, done=confirmation.done(done, number) if done else None)
+    return _tool(request, session, machine, number, done=verbs.done(done, number) if done else None)
 
 
 @router.post("/machines/{machine}/tools/{number}")
@@ -93,7 +93,7 @@ def _tool(
         errors=_errors(error) if error else {},
         done=done,
         wording=wording,
-        offered=confirmation.offered,
+        offered=verbs.offered,
     )
 
 

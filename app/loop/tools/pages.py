@@ -10,21 +10,18 @@ from starlette.responses import RedirectResponse
 
 from app.access.deps import Caller, Operator, Viewer, require
 from app.core.parameters import MOST_LOCATIONS
-from app.core.plausibility import empirical_value_warnings, offset_warnings
 from app.errors import Invalid
 from app.language.i18n import _
 from app.loop.machines import queries as machines
 from app.loop.machines.queries import machine_named
 from app.loop.tables.tools import OPEN
-from app.loop.tools import actions, confirmation, gain_queries, queries, sisters, wording
-from app.loop.tools.confirmation import Question
-from app.loop.tools.edge_schemas import SisterIn
-from app.loop.tools.form_reader import decide_as_typed
-from app.loop.tools.schemas import EmpiricalValueIn, ToolChange, ToolEdit
+from app.loop.tools import gain_queries, queries, verbs, wording
+from app.loop.tools.verbs import OfAverage, OfCorrection, OfTool
 from app.web.deps import FormDep, Number, SessionDep, Word
-from app.web.forms import by_field, length, parsed, words
+from app.web.forms import by_field
 from app.web.paging import address, part_of
 from app.web.templates import page
+from app.web.verb import Verb, carry_out, named
 
 router = APIRouter(include_in_schema=False)
 MOST_IN_QUEUE = 50
@@ -74,22 +71,17 @@ def memories(
         ),
         # Parts that come again show the tool of the first time: which one most likely matters changes by the second.
         here=memory_address(machine_row.key, tool=chosen.tool.number, before=before),
-        done=confirmation.done(done, n) if done and n else None,
-        late=_too_late(session, machine_row.key, late, n) if late and n else None,
+        done=verbs.done(done, n) if done and n else None,
+        late=verbs.too_late(session, machine_row, late, n) if late and n else None,
         wording=wording,
         address=memory_address,
-        offered=confirmation.offered,
+        offered=verbs.offered,
     )
 
 
 def _first(tools: list[queries.ToolRow]) -> queries.ToolRow:
     """The tool that one most likely wants to see."""
     return next((row for row in tools if row.open), None) or next((row for row in tools if row.in_use), tools[0])
-
-
-def _too_late(session: Session, machine: str, verb: str, number: int) -> list[str]:
-    correction = queries.correction(session, machine_named(session, machine), number)
-    return list(wording.refused(correction, machine, verb))
 
 
 @router.get("/machines/{machine}/corrections/{number}")
@@ -112,31 +104,30 @@ def _correction(
     caller: Caller,
     machine: str,
     number: int,
-    verb: str | None,
+    name: str | None,
     came_from: str | None,
     form: Mapping[str, str] | None = None,
     error: Invalid | None = None,
 ) -> Response:
-    machine_row = machine_named(session, machine)
-    row = queries.row_of(session, machine_row, queries.correction(session, machine_row, number))
-    confirmed_verb = verb if verb in confirmation.offered(row.correction.status) and caller.may("operator") else None
+    on = OfCorrection(session, machine_named(session, machine), number, caller)
+    row = on.row
+    chosen = next((verb for verb in verbs.offered(row.correction.status) if verb.name == name), None)
+    origin = {"from": came_from} if came_from else {}
     return page(
         request,
         "tools/correction.html",
         status=error.status if error else 200,
-        machine=machine_row,
+        machine=on.machine,
         row=row,
         back=LISTS.get(came_from or "") or memory_address(machine, tool=row.correction.tool_memory),
-        question=confirmation.about_correction(
-            row, confirmed_verb, queries.counting_on(session, machine_row, row.correction), came_from
-        )
-        if confirmed_verb
+        question=chosen.question(on, f"/machines/{machine}/corrections/{number}", **origin)
+        if chosen and caller.may("operator")
         else None,
         form=form or {},
         errors=by_field(error) if error else {},
         wording=wording,
         address=memory_address,
-        offered=confirmation.offered,
+        offered=verbs.offered,
     )
 
 
@@ -144,32 +135,33 @@ def _correction(
 def decide(
     request: Request, session: SessionDep, caller: Operator, machine: str, number: int, form: FormDep
 ) -> Response:
-    """Approve, release, reject, or confirm that it was applied. Who comes too late is told how it stands."""
-    machine_row, verb = machine_named(session, machine), form.get("do", "")
-    tool = queries.correction(session, machine_row, number).tool_memory
-    came_from = form.get("from")
+    """Approve, release, reject, or confirm that it was applied. Somebody who comes too late sees how it stands."""
+    on = OfCorrection(session, machine_named(session, machine), number, caller)
+    tool, came_from = on.row.correction.tool_memory, form.get("from")
+    verb = named(verbs.CORRECTION, form.get("do", ""), on, _("Go back to the tool memory."))
     try:
-        outcome = decide_as_typed(session, machine_row, number, form, caller)
+        outcome = carry_out(verb, on, form)
     except Invalid as error:
-        return _correction(request, session, caller, machine, number, verb, came_from, form, error)
-    if outcome == "fetched":
-        return _correction(request, session, caller, machine, number, verb, came_from, form)
+        return _correction(request, session, caller, machine, number, verb.name, came_from, form, error)
+    if outcome.kind == "ask":
+        return _correction(request, session, caller, machine, number, verb.name, came_from, form)
+    said = {outcome.kind: verb.name, "n": number}
     if came_from in LISTS:
-        return RedirectResponse(address(LISTS[came_from], at=machine, n=number, **{outcome: verb}), 303)
-    return RedirectResponse(memory_address(machine, tool=tool, n=number, **{outcome: verb}), 303)
+        return RedirectResponse(address(LISTS[came_from], at=machine, **said), 303)
+    return RedirectResponse(memory_address(machine, tool=tool, **said), 303)
 
 
-@router.get("/machines/{machine}/tools/{number}/{what}", dependencies=[require("operator")])
-def ask_tool(request: Request, session: SessionDep, machine: str, number: int, what: str) -> Response:
+def _of_tool(
+    session: Session, machine: str, number: int, caller: Caller, what: str
+) -> tuple[Verb[OfTool, Any], OfTool]:
+    on = OfTool(session, machine_named(session, machine), number, caller)
+    return named(verbs.TOOL, what, on, _("Go back to the tool memory.")), on
+
+
+@router.get("/machines/{machine}/tools/{number}/{what}")
+def ask_tool(request: Request, session: SessionDep, caller: Operator, machine: str, number: int, what: str) -> Response:
     """The forms of a manual edit (`edit`), of a tool change (`change`) and of going on with the sister tool (`sister`)."""
-    machine_row = machine_named(session, machine)
-    queries.tool(session, machine_row, number)
-    return _ask(
-        request,
-        session,
-        machine,
-        confirmation.about_tool(queries.tools(session, machine_row, only=number)[0], machine_row.key, what),
-    )
+    return _ask(request, *_of_tool(session, machine, number, caller, what))
 
 
 @router.post("/machines/{machine}/tools/{number}/{what}")
@@ -177,35 +169,15 @@ def set_tool(
     request: Request, session: SessionDep, caller: Operator, machine: str, number: int, what: str, form: FormDep
 ) -> Response:
     """The offset was set by hand, the tool was changed, or its sister goes on."""
-    machine_row = machine_named(session, machine)
-    queries.tool(session, machine_row, number)
-    question = confirmation.about_tool(queries.tools(session, machine_row, only=number)[0], machine_row.key, what)
-    fields = {"offset": length(form.get("offset")), "reason": words(form, "reason")}
-    outcome = what
-    try:
-        if what == "edit":
-            edit = parsed(ToolEdit, fields)
-            warnings = offset_warnings(queries.tool(session, machine_row, number).offset, edit.offset)
-            outcome = next(({"offset_step": "edit-far"}.get(warning.code, "edit-inches") for warning in warnings), what)
-            actions.edit_tool(session, machine_row, number, edit.offset, edit.reason, caller)
-        elif what == "sister":
-            why = parsed(SisterIn, {"reason": fields["reason"]})
-            number = sisters.switch_to_sister(session, machine_row, number, why.reason, caller).sister
-        else:
-            change = parsed(ToolChange, fields)
-            actions.change_tool(session, machine_row, number, change.offset, change.reason, caller)
-    except Invalid as error:
-        return _ask(request, session, machine, question, form, error)
-    return RedirectResponse(memory_address(machine, tool=number, done=outcome, n=number), 303)
+    return _do(request, *_of_tool(session, machine, number, caller, what), form)
 
 
-@router.get("/machines/{machine}/averages/{location}/edit", dependencies=[require("operator")])
-def ask_empirical_value(request: Request, session: SessionDep, machine: str, location: int) -> Response:
+@router.get("/machines/{machine}/averages/{location}/edit")
+def ask_empirical_value(
+    request: Request, session: SessionDep, caller: Operator, machine: str, location: int
+) -> Response:
     """The form of an empirical value."""
-    machine_row = machine_named(session, machine)
-    queries.average(session, machine_row, location)
-    row = queries.averages(session, machine_row, only=location)[0]
-    return _ask(request, session, machine, confirmation.about_average(row, machine_row.key))
+    return _ask(request, verbs.AVERAGE[0], OfAverage(session, machine_named(session, machine), location, caller))
 
 
 @router.post("/machines/{machine}/averages/{location}/edit")
@@ -213,40 +185,39 @@ def set_empirical_value(
     request: Request, session: SessionDep, caller: Operator, machine: str, location: int, form: FormDep
 ) -> Response:
     """Set the empirical value of an average memory."""
-    machine_row = machine_named(session, machine)
-    queries.average(session, machine_row, location)
-    question = confirmation.about_average(queries.averages(session, machine_row, only=location)[0], machine_row.key)
-    fields = {"empirical_value": length(form.get("empirical_value")), "reason": words(form, "reason")}
+    return _do(request, verbs.AVERAGE[0], OfAverage(session, machine_named(session, machine), location, caller), form)
+
+
+def _do(request: Request, verb: Verb[Any, Any], on: OfTool | OfAverage, form: Mapping[str, str]) -> Response:
     try:
-        value = parsed(EmpiricalValueIn, fields)
-        actions.set_empirical_value(session, machine_row, location, value.empirical_value, value.reason, caller)
+        said = carry_out(verb, on, form).said
     except Invalid as error:
-        return _ask(request, session, machine, question, form, error)
-    outcome = "average-large" if empirical_value_warnings(value.empirical_value) else "average"
-    return RedirectResponse(memory_address(machine, done=outcome, n=location), 303)
+        return _ask(request, verb, on, form, error)
+    tool = said.number if isinstance(on, OfTool) else None
+    return RedirectResponse(memory_address(on.machine.key, tool=tool, done=said.code, n=said.number), 303)
 
 
 def _ask(
     request: Request,
-    session: Session,
-    machine: str,
-    question: Question,
+    verb: Verb[Any, Any],
+    on: OfTool | OfAverage,
     form: Mapping[str, str] | None = None,
     error: Invalid | None = None,
 ) -> Response:
-    machine_row = machine_named(session, machine)
+    machine = on.machine
+    where = f"tools/{on.number}/{verb.name}" if isinstance(on, OfTool) else f"averages/{on.number}/edit"
     return page(
         request,
         "tools/ask.html",
         status=error.status if error else 200,
-        machine=machine_row,
-        question=question,
+        machine=machine,
+        question=verb.question(on, f"/machines/{machine.key}/{where}"),
         form=form or {},
         errors=by_field(error) if error else {},
         trail=[
             (_("Machines"), "/machines"),
-            (machine_row.name, f"/machines/{machine}"),
-            (_("Tool memory"), memory_address(machine)),
+            (machine.name, f"/machines/{machine.key}"),
+            (_("Tool memory"), memory_address(machine.key)),
         ],
-        back=memory_address(machine),
+        back=memory_address(machine.key),
     )

@@ -14,12 +14,12 @@ from app.language.i18n import _, ngettext
 from app.loop.machines.queries import machine_named
 from app.loop.programs import wording
 from app.loop.tools import fetching
-from app.loop.tools.confirmation import Question
 from app.loop.tools.text_api import corrections_file
 from app.web import paging
 from app.web.deps import FormDep, SessionDep
 from app.web.fields import LARGEST_SERIAL
 from app.web.templates import page
+from app.web.verb import Question
 
 router = APIRouter(include_in_schema=False)
 Count = Annotated[int, Query(ge=0, le=LARGEST_SERIAL)]
@@ -109,13 +109,13 @@ def _question(machine: str, handed: fetching.Handed) -> Question:
             "Is {n} correction in the control?", "Are all {n} corrections in the control?", len(handed.numbers)
         ).format(n=len(handed.numbers)),
         _("All are applied"),
-        address(machine),
         [
             _("Applied from now on: {numbers}.").format(numbers=numbers),
             _(
                 "The offsets known here change as the text changes them. If the text stopped with a message, do not confirm."
             ),
         ],
+        send_to=address(machine),
         hidden={"do": "applied", "numbers": " ".join(map(str, handed.numbers)), "form": handed.form.value},
     )
 

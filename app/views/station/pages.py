@@ -20,20 +20,16 @@ from app.access.sign_in import sign_out
 from app.errors import Conflict, InbandError, Invalid, NotAllowed, NotFound, TooManyRequests
 from app.language.i18n import _
 from app.loop.alarm_response import queries as alarms
+from app.loop.alarm_response import verbs as alarm_verbs
 from app.loop.alarm_response import wording as alarm_wording
-from app.loop.alarm_response.form_reader import acknowledge_as_typed
 from app.loop.alarm_response.outcomes import outcomes
 from app.loop.alarm_response.queries import AlarmRow
 from app.loop.machines.queries import machine_named
 from app.loop.notes import queries as notes
 from app.loop.notes.form_reader import write_as_typed
 from app.loop.notes.wording import beginning
-from app.loop.tools import actions as tools
-from app.loop.tools import confirmation
-from app.loop.tools import queries as tool_queries
-from app.loop.tools import wording as tool_wording
-from app.loop.tools.form_reader import decide_as_typed
-from app.loop.tools.schemas import ToolChange
+from app.loop.tools import verbs
+from app.loop.tools.verbs import CHANGE, OfCorrection, OfTool
 from app.quality.wear.queries import next_event
 from app.settings import Settings
 from app.views.approvals.queries import DECIDED_BY_PEOPLE
@@ -42,16 +38,19 @@ from app.views.characteristic.wording import state_word
 from app.views.station import queries
 from app.views.station.wording import next_action
 from app.web.deps import SESSION_COOKIE, STATION_COOKIE, FormDep, Number, SessionDep, SettingsDep, Word, from_this_site
-from app.web.forms import by_field, length, parsed, words
+from app.web.forms import by_field
 from app.web.limits import FEW, takes
 from app.web.live import Access, stream
 from app.web.paging import address
 from app.web.templates import page
+from app.web.verb import Verb, carry_out, named
 
 router = APIRouter(prefix="/station", include_in_schema=False)
 NO_FORM: Mapping[str, str] = {}
 REFUSED = (Invalid, NotIdentified, NotAllowed, TooManyRequests)
 """After these the same is asked again, with what was typed."""
+NOBODY = Caller("person", "")
+"""Asks the question; who acts is asked with it."""
 
 
 @router.get("")
@@ -126,13 +125,11 @@ def station_page(
         may_act=at.may_act,
         done=_of_machine(session, station.machine.key, done) if done else None,
         late=_of_machine(session, station.machine.key, late) if late else None,
-        tool=confirmation.done("change", tool) if tool else None,
-        said=confirmation.done(decided, n) if decided and n else None,
-        refused=list(tool_wording.refused(tool_queries.correction(session, station.machine, n), machine, too_late))
-        if too_late and n
-        else None,
+        tool=verbs.done("change", tool) if tool else None,
+        said=verbs.done(decided, n) if decided and n else None,
+        refused=verbs.too_late(session, station.machine, too_late, n) if too_late and n else None,
         written=_beginning_of(session, station.machine.key, note) if note else None,
-        offered=confirmation.offered,
+        offered=verbs.offered,
         now=datetime.now(UTC),
         state_word=state_word,
         band=lambda row: band_picture(
@@ -198,47 +195,18 @@ def acknowledge(
 ) -> Response:
     """Acknowledge the alarm. Sent twice, or after somebody else, it changes nothing and says so."""
     row = _of_machine(session, machine, number)
-    outcome = "done"
     try:
-        caller = _who(request, session, at, form)
-        acknowledge_as_typed(session, number, form, caller)
-    except Conflict:
-        alarm = alarms.alarm(session, number).alarm
-        again = alarm.acknowledged_by == caller.name and alarm.action == form.get("action")
-        outcome = "done" if again else "late"
+        outcome = alarm_verbs.acknowledge(session, number, form, _who(request, session, at, form))
     except REFUSED as error:
         return _ask_alarm(request, session, at, row, form.get("action", ""), form, error)
-    return RedirectResponse(address(f"/station/{machine}", **{outcome: number}), 303)
+    return RedirectResponse(address(f"/station/{machine}", **{outcome.kind: number}), 303)
 
 
 @router.get("/{machine}/tools/{number}/change")
 def ask_tool(request: Request, session: SessionDep, at: Station, machine: str, number: int) -> Response:
     """The second touch of a tool change."""
     at.must_act()
-    return _ask_tool(request, session, at, machine, number)
-
-
-def _ask_tool(
-    request: Request,
-    session: Session,
-    at: AtStation,
-    key: str,
-    number: int,
-    form: Mapping[str, str] = NO_FORM,
-    error: InbandError | None = None,
-) -> Response:
-    machine = machine_named(session, key)
-    tool_queries.tool(session, machine, number)
-    (row,) = tool_queries.tools(session, machine, only=number)
-    question = confirmation.about_tool(row, machine.key, "change")
-    return page(
-        request,
-        "station/ask.html",
-        status=error.status if error else 200,
-        machine=machine,
-        question=replace(question, send_to=f"/station/{machine.key}/tools/{number}/change"),
-        **_asked(session, at, form, error),
-    )
+    return _ask(request, at, CHANGE, OfTool(session, machine_named(session, machine), number, NOBODY))
 
 
 @router.post("/{machine}/tools/{number}/change")
@@ -246,13 +214,11 @@ def change_tool(
     request: Request, session: SessionDep, at: Station, machine: str, number: int, form: FormDep
 ) -> Response:
     """Say that the tool was changed."""
-    machine_row = machine_named(session, machine)
+    on = OfTool(session, machine_named(session, machine), number, NOBODY)
     try:
-        caller = _who(request, session, at, form)
-        change = parsed(ToolChange, {"offset": length(form.get("offset")), "reason": words(form, "reason")})
-        tools.change_tool(session, machine_row, number, change.offset, change.reason, caller)
+        carry_out(CHANGE, replace(on, caller=_who(request, session, at, form)), form)
     except REFUSED as error:
-        return _ask_tool(request, session, at, machine, number, form, error)
+        return _ask(request, at, CHANGE, on, form, error)
     return RedirectResponse(address(f"/station/{machine}", tool=number), 303)
 
 
@@ -267,50 +233,63 @@ def ask_correction(
 ) -> Response:
     """The second touch at a correction that waits for a decision. One that is decided meanwhile leads back."""
     at.must_act()
-    return _ask_correction(request, session, at, machine, number, do)
+    return _ask_correction(request, at, OfCorrection(session, machine_named(session, machine), number, NOBODY), do)
 
 
 def _ask_correction(
     request: Request,
-    session: Session,
     at: AtStation,
-    key: str,
-    number: int,
-    verb: str,
+    on: OfCorrection,
+    name: str,
     form: Mapping[str, str] = NO_FORM,
     error: InbandError | None = None,
 ) -> Response:
-    machine = machine_named(session, key)
-    row = tool_queries.row_of(session, machine, tool_queries.correction(session, machine, number))
-    if row.correction.status not in DECIDED_BY_PEOPLE:
-        return RedirectResponse(address(f"/station/{key}", too_late=verb or "approve", n=number), 303)
-    if verb not in confirmation.offered(row.correction.status):
-        raise NotFound(_("There is nothing at this address."), _("Go back to the station of the machine."))
-    counting_on = tool_queries.counting_on(session, machine, row.correction)
-    question = confirmation.about_correction(row, confirmation.verb(verb), counting_on)
-    return page(
+    status = on.row.correction.status
+    if status not in DECIDED_BY_PEOPLE:
+        back = address(f"/station/{on.machine.key}", too_late=name or "approve", n=on.number)
+        return RedirectResponse(back, 303)
+    return _ask(
         request,
-        "station/ask.html",
-        status=error.status if error else 200,
-        machine=machine,
-        question=replace(question, send_to=f"/station/{machine.key}/corrections/{number}"),
-        **_asked(session, at, form, error),
+        at,
+        named(verbs.offered(status), name, on, _("Go back to the station of the machine.")),
+        on,
+        form,
+        error,
     )
 
 
 @router.post("/{machine}/corrections/{number}")
 def decide(request: Request, session: SessionDep, at: Station, machine: str, number: int, form: FormDep) -> Response:
-    """Approve, release or reject a correction. Who comes too late is told how it stands."""
-    machine_row, verb = machine_named(session, machine), confirmation.verb(form.get("do", ""))
+    """Approve, release or reject a correction. Somebody who comes too late sees how it stands."""
+    on = OfCorrection(session, machine_named(session, machine), number, NOBODY)
+    verb = named(verbs.CORRECTION, form.get("do", ""), on, _("Go back to the station of the machine."))
     try:
-        caller = _who(request, session, at, form)
-        outcome = decide_as_typed(session, machine_row, number, form, caller)
+        outcome = carry_out(verb, replace(on, caller=_who(request, session, at, form)), form)
     except REFUSED as error:
-        return _ask_correction(request, session, at, machine, number, verb, form, error)
-    if outcome == "fetched":
-        return _ask_correction(request, session, at, machine, number, verb, form)
-    said = {"decided": verb} if outcome == "done" else {"too_late": verb}
+        return _ask_correction(request, at, on, verb.name, form, error)
+    if outcome.kind == "ask":
+        return _ask_correction(request, at, on, verb.name, form)
+    said = {"decided": verb.name} if outcome.kind == "done" else {"too_late": verb.name}
     return RedirectResponse(address(f"/station/{machine}", n=number, **said), 303)
+
+
+def _ask(
+    request: Request,
+    at: AtStation,
+    verb: Verb[Any, Any],
+    on: OfTool | OfCorrection,
+    form: Mapping[str, str] = NO_FORM,
+    error: InbandError | None = None,
+) -> Response:
+    where = f"tools/{on.number}/change" if isinstance(on, OfTool) else f"corrections/{on.number}"
+    return page(
+        request,
+        "station/ask.html",
+        status=error.status if error else 200,
+        machine=on.machine,
+        question=verb.question(on, f"/station/{on.machine.key}/{where}"),
+        **_asked(on.session, at, form, error),
+    )
 
 
 @router.get("/{machine}/note")

@@ -3,12 +3,10 @@
 from typing import Annotated
 
 from fastapi import APIRouter, Query, Request, Response
-from sqlalchemy.orm import Session
 
 from app.access.deps import Viewer, require
 from app.loop.machines import queries as machines
-from app.loop.tools import confirmation, wording
-from app.loop.tools import queries as tools
+from app.loop.tools import verbs
 from app.views.to_do import queries
 from app.web.deps import Number, SessionDep, Word
 from app.web.templates import page
@@ -47,15 +45,10 @@ def to_do_page(
         machines=every,
         by_machine={one.key: by_machine[one.id] for one in every if one.id in by_machine},
         mine=mine,
-        offered=confirmation.offered,
-        done=confirmation.done(done, n) if done and n else None,
-        late=_too_late(session, at, late, n) if at and late and n else None,
+        offered=verbs.offered,
+        done=verbs.done(done, n) if done and n else None,
+        late=verbs.too_late(session, machines.machine_named(session, at), late, n) if at and late and n else None,
     )
-
-
-def _too_late(session: Session, machine: str, verb: str, number: int) -> list[str]:
-    of_machine = machines.machine_named(session, machine)
-    return list(wording.refused(tools.correction(session, of_machine, number), machine, verb))
 
 
 @router.get("/todo/count", dependencies=[require("viewer")])

@@ -143,7 +143,7 @@ class TestInABrowser:
         waiting = page.locator(f"#correction-{number}")
         expect(waiting).to_contain_text("−20.0")
         waiting.get_by_role("link", name="Mark applied").click()
-        page.get_by_role("dialog").get_by_role("button", name="It is applied").click()
+        page.get_by_role("dialog").get_by_role("button", name="Mark applied").click()
         expect(page.locator("main")).to_contain_text(f"Correction {number} is applied")
         expect(page.locator("#tool-now")).to_contain_text("−0.0200")
         expect(page.locator("#steps")).to_contain_text(operator.name)

@@ -1,0 +1,174 @@
+"""A verb: something a person does to one thing, declared once.
+
+A room declares its verbs. Each is drawn as a dialog, a page and a station (`Verb.question`, `carry_out`) and as a JSON route
+(`draw`); the button, the sentence afterwards and the form follow from the declaration. The savepoint, "somebody was first"
+and "sent twice" are here and nowhere else.
+"""
+
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass, field
+from typing import Annotated, Any, Generic, Literal, NamedTuple, Protocol, TypeVar
+
+from fastapi import APIRouter, Depends
+from pydantic import BaseModel
+from sqlalchemy.orm import Session
+
+from app.errors import Conflict, NotFound
+from app.language.i18n import _
+from app.web.api import problems
+from app.web.forms import typed
+
+
+class Subject(Protocol):
+    """A thing with its caller and session, and the words for it in sentences."""
+
+    @property
+    def session(self) -> Session:
+        """The transaction of the request."""
+        ...
+
+    @property
+    def number(self) -> int:
+        """By which sentences and addresses name it."""
+        ...
+
+    @property
+    def values(self) -> Mapping[str, Any]:
+        """The words that a sentence may name: ``{"number": 12, "tool": 3}``."""
+        ...
+
+
+On = TypeVar("On", bound=Subject)
+Sent = TypeVar("Sent", bound=BaseModel)
+
+
+class Said(NamedTuple):
+    """The code of the sentence after an act, and the number in it, where they are not the verb's and the thing's."""
+
+    code: str
+    number: int
+
+
+class Outcome(NamedTuple):
+    """The end of an act: done; late, somebody else was first; ask, the question is another one now."""
+
+    kind: Literal["done", "late", "ask"]
+    said: Said
+
+
+@dataclass(frozen=True)
+class Size:
+    """The one length that a question may ask for. name: its field; r: the R number it has; value: typed already."""
+
+    name: str
+    label: str
+    r: str
+    value: str = ""
+    hint: str = ""
+    needed: bool = False
+
+
+@dataclass(frozen=True)
+class Question:
+    """Content of a confirmation dialog: what follows, reasons to choose from, where it is sent, and hidden fields."""
+
+    title: str
+    button: str
+    follows: list[str]
+    reasons: list[str] = field(default_factory=list)
+    size: Size | None = None
+    send_to: str = ""
+    hidden: dict[str, str] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Act(Generic[On, Sent]):
+    """One act on one kind of thing.
+
+    act: does it; raises `Conflict` when the thing does not permit it any more. Its name and docstring describe the JSON route.
+    own: after a `Conflict`, tells if the caller had done the same before. asks_again: tells if a `Conflict` is a new warning to
+    be shown with the question. needs_body: False where JSON may leave it out.
+    by_machine: a machine's own key may do it.
+    """
+
+    name: str
+    body: type[Sent]
+    act: Callable[[On, Sent], Any]
+    own: Callable[[On], bool] = lambda _on: False
+    asks_again: Callable[[Conflict], bool] = lambda _error: False
+    needs_body: bool = True
+    by_machine: bool = False
+
+
+@dataclass(frozen=True, kw_only=True)
+class Verb(Act[On, Sent]):
+    """An act with its question. A title names the `values` of the subject as {number}, the sentence afterwards {n}.
+
+    word: on its button; follows: the consequences; reasons: likely ones; size: the length that is asked for; said: afterwards.
+    when: states of the thing in which it is offered; fits: tells if it can be asked of this one.
+    """
+
+    word: Callable[[], str]
+    title: Callable[[On], str]
+    follows: Callable[[On], list[str]]
+    said: Callable[[], str]
+    reasons: Callable[[], list[str]] = list
+    size: Callable[[On], Size] | None = None
+    hidden: Callable[[On], dict[str, str]] = lambda _on: {}
+    when: tuple[str, ...] = ()
+    fits: Callable[[On], bool] = lambda _on: True
+
+    def question(self, on: On, send_to: str, **hidden: str) -> Question:
+        """The dialog that asks for it, and the form that does it."""
+        return Question(
+            self.title(on).format(**on.values),
+            self.word(),
+            self.follows(on),
+            self.reasons(),
+            self.size(on) if self.size else None,
+            send_to,
+            {"do": self.name, **self.hidden(on), **hidden},
+        )
+
+
+def carry_out(verb: Act[On, Sent], on: On, form: Mapping[str, str]) -> Outcome:
+    """Do what the form asks for, or nothing of it; sent twice by one person it is done once. Raises `Invalid`, `NotFound`."""
+    sent, usual = typed(verb.body, form), Said(verb.name, on.number)
+    try:
+        with on.session.begin_nested():
+            result = verb.act(on, sent)
+    except Conflict as error:
+        on.session.expire_all()
+        if verb.asks_again(error):
+            return Outcome("ask", usual)
+        return Outcome("done" if verb.own(on) else "late", usual)
+    return Outcome("done", result if isinstance(result, Said) else usual)
+
+
+def named(verbs: Iterable[Verb[On, Any]], name: str, on: On, back: str) -> Verb[On, Any]:
+    """The verb of this name that fits the thing. back: where to go if there is none. Raises `NotFound`."""
+    for verb in verbs:
+        if verb.name == name and verb.fits(on):
+            return verb
+    raise NotFound(_("There is nothing at this address."), back)
+
+
+def said(verbs: Iterable[Verb[Any, Any]], name: str, number: int) -> str | None:
+    """The page's message after the act; None for a name that no verb has."""
+    return next((verb.said().format(n=number) for verb in verbs if verb.name == name), None)
+
+
+def draw(
+    router: APIRouter, path: str, verb: Act[On, Any], subject: Any, answer: Callable[[On, Any], Any], model: Any
+) -> None:
+    """Add the JSON route that does it. subject: the dependency that finds the thing; answer: from it and what `act` returns."""
+    body: Any = verb.body if verb.needs_body else verb.body | None
+
+    def route(on: Any, sent: Any = None) -> Any:
+        return answer(on, verb.act(on, sent if sent is not None else verb.body()))
+
+    route.__name__, route.__doc__ = verb.act.__name__, verb.act.__doc__
+    route.__annotations__ = {"on": Annotated[Any, Depends(subject)], "sent": body, "return": model}
+    if verb.needs_body:
+        route.__defaults__ = None
+    router.post(path, responses=problems(404, 409))(route)
