@@ -70,7 +70,7 @@ def study_of(session: Session, current: CurrentCharacteristic, choice: StudyRequ
         current.characteristic,
         last=None if last == "all" else min(int(last), LARGEST_ID),
         period=choice.period,
-        usable=True,
+        usable=choice.last is None,
     )
     return queries.capability_of(
         session,

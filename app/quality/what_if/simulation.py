@@ -88,5 +88,5 @@ def settings(past: ToolHistory, given: SettingsIn) -> Settings:
 
 
 def _past(session: Session, current: CurrentCharacteristic, given: ReplayPeriodIn) -> ToolHistory:
-    window = statistics.window_of(session, current.characteristic, last=given.newest, period=given.period, usable=True)
+    window = statistics.window_of(session, current.characteristic, last=given.newest, period=given.period)
     return queries.load(session, current, window)

@@ -71,7 +71,7 @@ def window_of(
 ) -> Window:
     """The readings first … through; of them the `last` so many; of them those measured in the period.
 
-    usable: neither excluded readings nor probe faults count for `last`, up to `MOST_COUNTED`, so that an index of the last
+    usable: where nobody has asked for a number: neither excluded readings nor probe faults count for `last`, up to `MOST_COUNTED`, so that an index of the last
     1000 stays one of 1000 readings when somebody excludes one.
     """
     newest = newest_of(session, characteristic)

@@ -51,7 +51,11 @@ class Frame:
         """The readings measured in the period."""
         request = self.request
         return statistics.window_of(
-            self.session, self.current.characteristic, last=request.newest, period=request.period, usable=True
+            self.session,
+            self.current.characteristic,
+            last=request.newest,
+            period=request.period,
+            usable=request.last is None,
         )
 
     @cached_property
