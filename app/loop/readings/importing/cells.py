@@ -183,7 +183,9 @@ def _of_row(row: Row, layout: Layout, readers: Sequence["_Reader"]) -> Iterator[
         try:
             if layout.kind == "sheet":
                 _refuse_error(text)
-            values[name] = read(text)
+            value = read(text)
+            if value is not None or not (text and name == "measured_at"):  # a default of programs is no time
+                values[name] = value
         except Unreadable as error:
             flawed = True
             yield Flaw(row.line, layout.named(name), shown(text), str(error))
@@ -323,6 +325,9 @@ def _converted(values: dict[str, Any], layout: Layout, number: int) -> Iterator[
     for name in ("measured_at", "machined_at"):
         if isinstance(values.get(name), str):
             try:
-                values[name] = layout.times.moment(values[name], layout.zone, layout.time_format)
+                at = layout.times.moment(values[name], layout.zone, layout.time_format)
+                if at is None and values.pop(name).strip():
+                    continue
+                values[name] = at
             except Unreadable as error:
                 yield Flaw(number, layout.named(name), shown(values[name]), str(error))

@@ -10,10 +10,13 @@ from typing import Any, NamedTuple
 from app.errors import Invalid
 from app.files.apart import PREFIX, apart, spend
 from app.files.formats.delimited import Unusable
+from app.language.i18n import _
 from app.loop.readings.importing.cells import Flaw, Looked, Passed, fingerprint, items, looked, put_down, shown, taken
 from app.loop.readings.importing.layout import Layout, Wishes, wrong
 from app.loop.readings.origin import Origin, guid_of
 from app.loop.readings.schemas import ReadingIn, reading_of
+
+MOST_HELD = 1_000  # lines in a row without a time; of more the first are readings
 
 
 class Line(NamedTuple):
@@ -64,6 +67,27 @@ def read_apart(path: Path, layouts: Sequence[Layout], most: int | None = None) -
         )
 
 
+def _before_a_time(
+    found: Iterable[tuple[int, dict[str, Any] | Flaw | Passed]], layout: Layout
+) -> Iterator[tuple[int, dict[str, Any] | Flaw | Passed]]:
+    """The same; lines whose time is empty are flaws where no line below has one: they may be sums or means."""
+    held: list[tuple[int, dict[str, Any]]] = []
+    for number, item in found:
+        if isinstance(item, dict):
+            if item.get("measured_at", number) is None and len(held) < MOST_HELD:
+                held.append((number, item))
+                continue
+            yield from held
+            held.clear()
+        yield number, item
+    for number, _item in held:
+        reason = _(
+            "has no time, and no line below has one. If it is a sum or a mean, name the last line of readings (--last-line); "
+            "else write its time"
+        )
+        yield number, Flaw(number, layout.named("measured_at"), "", reason)
+
+
 def _readings(
     found: Iterable[tuple[int, dict[str, Any] | Flaw | Passed]],
     layout: Layout,
@@ -71,7 +95,7 @@ def _readings(
     mark: str,
     now: datetime,
 ) -> Iterator[Line | Flaw | Passed]:
-    for number, item in found:
+    for number, item in _before_a_time(found, layout):
         if isinstance(item, Flaw | Passed):
             yield item
             continue
