@@ -45,6 +45,9 @@ SURE_FIRST, SURE_SECOND = 1.9, 3.5  # standard errors that they are below 1, and
 KNOWN, FRESH = 20, 8.0
 # Standard deviations of a step between two parts of one correction: the process moved by itself, as where an edge breaks.
 ITSELF = 4.0
+# A gain that each of two corrections exceeds where the offset has another unit; times the scatter that each has done; how many times
+# the gain of one that of the other may be; how many times the first the second asks for, to take back what that has done.
+FAR_TOO_STRONG, CLEARLY, ALIKE, BACK = 8.0, 12.0, 1.5, -4.0
 PRIOR, FEW = 3.0, 1.0  # parts that the expected scatter is worth; by how much surer one must be while it is not known
 NM = 1e-6
 
@@ -102,13 +105,43 @@ def opposed(deviation: Floats, compensated: Floats, factor: float, begin: int, e
     judged = Judged(*judge(deviation, compensated, factor, begin, expected))
     if not judged.opposed:
         return None
-    ends = (begin, judged.first, judged.second, len(deviation))
+    first, second = _steps(deviation, compensated, factor, (begin, judged.first, judged.second))
+    return Opposed(first, second, judged.gain, judged.error)
+
+
+def _steps(deviation: Floats, compensated: Floats, factor: float, places: tuple[int, int, int]) -> tuple[Step, Step]:
+    """Return what the two newest corrections asked and did. places: the beginning, and where each took effect."""
+    ends = (*places, len(deviation))
     steps = []
     for low, at, high in zip(ends, ends[1:], ends[2:], strict=False):
         done = deviation[at : min(high, at + NEAR)].mean() - deviation[max(low, at - NEAR) : at].mean()
         before, after = float(compensated[at - 1]), float(compensated[at])
         steps.append(Step((before - after) / factor, float(done), before, after))
-    return Opposed(steps[0], steps[1], judged.gain, judged.error)
+    return steps[0], steps[1]
+
+
+def overdone(deviation: Floats, compensated: Floats, factor: float, expected: float) -> tuple[float, float] | None:
+    """The gain of the two newest corrections and its standard error, if each did many times what it asked.
+
+    An offset that is taken for inches does 25 times as much: R37 holds the third, and there are never enough for `app.core.effect`. By
+    itself the size moves so far where an edge breaks, but not twice in the sense of what was asked. expected: as in `opposed`.
+
+    >>> d, s = np.array([0.0015, -0.0366, 0.893]), np.array([0.0, -0.0015, 0.0351])
+    >>> gain, error = overdone(d, s, -1.0, 0.0003)
+    >>> round(gain, 1), overdone(np.array([0.0015, 0.0366, 0.0001]), np.array([0.0, -0.0015, -0.0381]), -1.0, 0.0003)
+    (25.4, None)
+    """
+    start, first, second = newest_two(compensated, 0)
+    if first == 0:
+        return None
+    steps = _steps(deviation, compensated, factor, (start, first, second))
+    if steps[1].asked / steps[0].asked > BACK:
+        return None
+    low, high = sorted(step.done / step.asked for step in steps)
+    if low < FAR_TOO_STRONG or high > ALIKE * low or min(abs(step.done) for step in steps) < CLEARLY * expected:
+        return None
+    asked = sum(step.asked * step.asked for step in steps)
+    return sum(step.asked * step.done for step in steps) / asked, expected * sqrt(2 / asked)
 
 
 def newest_two(compensated: Floats, begin: int) -> tuple[int, int, int]:

@@ -8,7 +8,7 @@ from numba import njit
 
 import app.core.decision.loops  # noqa: F401 - compiles what `step` calls
 from app.core.decision.step import BELIEVED, CORRECT, Rules, effect_of, rounded, step
-from app.core.gain import LONGEST, expected_scatter, judge
+from app.core.gain import LONGEST, expected_scatter, judge, overdone
 from tests.chance import runs
 
 SETTINGS = np.dtype(
@@ -123,3 +123,27 @@ def test_a_wrong_sign_is_stopped_by_the_second_correction(runs: int, gain: float
     began = [(outcome, sizes) for _sigma, outcome, sizes in lives(runs, 11, wrong=gain) if sizes[0] > 0]
     assert len(began) > 0.9 * runs
     assert sum(0 <= outcome <= 2 for outcome, _sizes in began) >= 0.99 * len(began)
+
+
+def test_no_right_gain_is_far_too_strong_though_edges_break() -> None:
+    """Loops of true gains of 0.7 to 1.3 with scatter, wear, chips, and an edge that breaks once in fifty parts."""
+    chance = np.random.default_rng(8)
+    for life_ in range(100):
+        gain, sigma, delay = chance.uniform(0.7, 1.3), 0.0005, int(chance.integers(0, 3))
+        rules = rules_of(sigma * float(chance.choice([1, 2, 3])), sigma * 6, float(chance.choice([1, 2, 5])), -1.0)
+        level, offset, total, average, waiting = 0.0, 0.0, 0.0, 0.0, [0.0] * delay
+        deviation: list[float] = []
+        compensated: list[float] = []
+        for _part in range(60):
+            level += 0.1 * sigma + (sigma * chance.uniform(20, 100) if chance.random() < 0.02 else 0.0)
+            chip = 20 * sigma if chance.random() < 0.02 else 0.0
+            size = float(level + gain * offset + chance.normal(0, sigma) + chip)
+            deviation.append(size)
+            compensated.append(offset)
+            made = step(rules, average, total, size, sum(waiting), False, False, False, False, BELIEVED)
+            average, amount = made.average, made.amount if made.action == CORRECT else 0.0
+            total += amount
+            waiting.append(amount)
+            offset += waiting.pop(0)
+            found = overdone(np.array(deviation), np.array(compensated), -1.0, sigma)
+            assert found is None, (life_, found)

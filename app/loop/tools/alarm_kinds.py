@@ -139,6 +139,9 @@ CORRECTIONS_NOT_TAKEN = register(
 )
 
 
+ANOTHER_UNIT = 8  # gain from which on no radius was taken for a diameter
+
+
 def _unusual(alarm: Alarm) -> str:
     data = alarm.data
     values = {
@@ -161,8 +164,12 @@ def _unusual(alarm: Alarm) -> str:
             "The corrections of tool {tool} act too strongly: gain {gain} {pm} {error} from {n} corrections, it should be 1. "
             "Radius taken for diameter?"
         ),
+        "unit": _(
+            "The corrections of tool {tool} act many times too strongly: gain {gain} {pm} {error} from {n} corrections, it should "
+            "be 1. Is the offset in inches at the control, or in steps?"
+        ),
     }.get(
-        str(data.get("verdict")),
+        "unit" if data.get("verdict") == "strong" and data.get("gain", 0) >= ANOTHER_UNIT else str(data.get("verdict")),
         _(
             "The corrections of tool {tool} do the opposite of what they ask: gain {gain} {pm} {error} from {n} corrections, it "
             "should be 1. Wrong sign of the factor?"

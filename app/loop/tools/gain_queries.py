@@ -6,7 +6,8 @@ import numpy as np
 from sqlalchemy import func, literal_column, select
 from sqlalchemy.orm import Session
 
-from app.core.effect import Gain, gain_of
+from app.core.effect import Gain, GainVerdict, gain_of
+from app.core.gain import expected_scatter, overdone
 from app.core.parameters import Parameters
 from app.loop.tables.alarms import Alarm
 from app.loop.tables.characteristics import Characteristic, ParametersVersion
@@ -46,12 +47,12 @@ def gains(session: Session, machine: Machine, number: int) -> list[ToolGain]:
     ).all()
     found = []
     for stream, key, stored in streams:
-        factor = Parameters.from_dict(stored).factor
-        found.append(ToolGain(stream.characteristic_id, key, factor, _gain(session, stream, factor)))
+        parameters = Parameters.from_dict(stored)
+        found.append(ToolGain(stream.characteristic_id, key, parameters.factor, _gain(session, stream, parameters)))
     return found
 
 
-def _gain(session: Session, stream: Stream, factor: float) -> Gain | None:
+def _gain(session: Session, stream: Stream, parameters: Parameters) -> Gain | None:
     at = (Reading.machine_id == stream.machine_id, Reading.characteristic_id == stream.characteristic_id)
     answered = (
         select(func.max(Alarm.acknowledged_at))
@@ -80,4 +81,9 @@ def _gain(session: Session, stream: Stream, factor: float) -> Gain | None:
         .order_by(Reading.sequence)
     ).all()
     table = np.array([tuple(row) for row in rows], np.float64).reshape(-1, 2)
-    return gain_of(table[:, 0], table[:, 1], factor)
+    deviation, compensated = table[:, 0], table[:, 1]
+    expected = expected_scatter(parameters.zero_range, parameters.averaging_limit)
+    if len(table) and (found := overdone(deviation, compensated, parameters.factor, expected)):
+        gain, half = found[0], 2 * found[1]
+        return Gain(gain, gain - half, gain + half, 2, len(table), GainVerdict.STRONG)
+    return gain_of(deviation, compensated, parameters.factor)

@@ -126,6 +126,18 @@ def test_an_unusual_gain_is_told_with_its_number(
     assert f"from {told['corrections']} corrections" in page
 
 
+def test_an_offset_in_inches_is_told_from_two_corrections(shop: Shop, server: Any) -> None:
+    """More are never made: the third would be of a millimetre, and is held as that of a worn tool."""
+    loop = Loop(shop, 25.4)
+    shop.call("PATCH", f"/characteristics/{loop.key}", parameters={"factor": -1}, reason="as it is usual")
+    for _part in range(3):
+        loop.part()
+    run_jobs(server.database, JOBS)
+    (alarm,) = [each for each in shop.alarms() if each["kind"] == "unusual_gain"]
+    assert "gain +25.4" in alarm["text"]
+    assert "in inches" in alarm["text"]
+
+
 def test_a_right_gain_raises_nothing(shop: Shop, server: Any) -> None:
     loop, chance = Loop(shop, -1.0), np.random.default_rng(5)
     shop.call("PATCH", f"/characteristics/{loop.key}", parameters={"factor": -1}, reason="as it is usual")
