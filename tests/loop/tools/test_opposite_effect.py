@@ -129,6 +129,7 @@ def test_an_unusual_gain_is_told_with_its_number(
 def test_an_offset_in_inches_is_told_from_two_corrections(shop: Shop, server: Any) -> None:
     """More are never made: the third would be of a millimetre, and is held as that of a worn tool."""
     loop = Loop(shop, 25.4)
+    loop.size = 1.5
     shop.call("PATCH", f"/characteristics/{loop.key}", parameters={"factor": -1}, reason="as it is usual")
     for _part in range(3):
         loop.part()
