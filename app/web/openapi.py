@@ -74,6 +74,28 @@ TAGS = {
     "documentation": "This description. It needs no key.",
 }
 OPEN_TAGS = {"health", "documentation"}
+USUAL = {
+    "items": "The rows of this page.",
+    "next": "Where the next page begins: sent as `after`. Null on the last page.",
+    "machine": "Key of the machine.",
+    "characteristic": "Key of the characteristic.",
+    "id": "Identifies it.",
+    "name": "Its name.",
+    "text": "In words, for people.",
+    "code": "A stable name, for programs.",
+    "what_to_do": "What to do, for people.",
+    "by": "Who did it: a person, a key, or the server itself.",
+    "at": "When it was done.",
+    "created_at": "When it was made.",
+    "updated_at": "When it was changed last.",
+    "measured_at": "When it was measured.",
+    "received_at": "When the server received it.",
+    "reason": "Why, in words.",
+    "role": "What the person or key may do.",
+    "first_sequence": "Number of the first reading.",
+    "last_sequence": "Number of the last reading.",
+}
+"""Descriptions of fields that mean the same wherever they stand, where a model says nothing of its own."""
 EXAMPLES = HOUSE / "docs" / "reference" / "api-examples"
 
 
@@ -147,6 +169,7 @@ def _made(app: FastAPI, schemas: Mapping[str, Any], root: str) -> Json:
             operation["x-role"], operation["x-machine-key"] = roles[operation["operationId"]]
     _tidy(openapi["paths"])
     _tidy(components["schemas"])
+    _describe(components["schemas"])
     return openapi
 
 
@@ -255,6 +278,17 @@ def _all_dependencies(of: Dependant) -> Iterator[Dependant]:
     for dependency in of.dependencies:
         yield dependency
         yield from _all_dependencies(dependency)
+
+
+def _describe(schemas: Json) -> None:
+    """Describe fields that have no description: by that of the type that may be null, or as `USUAL` has it."""
+    for schema in schemas.values():
+        for name, field in schema.get("properties", {}).items():
+            if "description" in field or "$ref" in field:
+                continue
+            said = [option["description"] for option in field.get("anyOf", ()) if "description" in option]
+            if said or name in USUAL:
+                field["description"] = said[0] if said else USUAL[name]
 
 
 def _tidy(part: Any) -> None:
