@@ -81,6 +81,18 @@ class TestComplete:
         ]
         assert len(bare) <= 560, bare
 
+    def test_calibrations_may_be_sent_by_the_numbers_of_the_control(self, made: Json) -> None:
+        for name, body in (
+            (
+                "GaugeIn",
+                {"R11", "R32", "R33", "R34", "R36", "R29", "touches", "key"},
+            ),  # as docs/how-to/calibrate.md sends it
+            ("RingIn", {"tool_memory", "#502", "#505", "#506", "#507", "sections"}),
+        ):
+            schema = made["components"]["schemas"][name]
+            assert body <= set(schema["properties"])
+            assert set(schema["required"]) <= body
+
     def test_figures_have_a_schema(self, made: Json) -> None:
         for _method, path, operation in operations(made):
             for media, described in media_of(operation["responses"].get("200", {})):

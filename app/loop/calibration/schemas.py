@@ -1,8 +1,9 @@
 """Calibrations, pairs and plans as JSON. Lengths in mm."""
 
+from collections.abc import Callable
 from typing import Annotated, Any, Literal
 
-from pydantic import Field, model_validator
+from pydantic import ConfigDict, Field, model_validator
 from pydantic_core import PydanticCustomError
 
 from app.core.calibration import SECTIONS
@@ -53,8 +54,38 @@ def _by_number(value: Any, names: dict[str, str]) -> Any:
     return fields
 
 
+def _schema_with(numbers: dict[str, str], more: dict[str, str]) -> Callable[[dict[str, Any]], None]:
+    """Return what adds the numbers that may stand in place of names to a schema; either of the two is needed then.
+
+    more: numbers without a name of their own, and their meaning.
+    """
+
+    def add(schema: dict[str, Any]) -> None:
+        properties = schema["properties"]
+        for number, name in numbers.items():
+            codes = R_CODES.get(number)
+            kind = {"type": ["integer", "string", "null"]} if codes else dict(properties[name])
+            kind.pop("default", None)  # stands at the name
+            words = ": " + ", ".join(f"{code} is {choice}" for code, choice in codes.items()) if codes else ""
+            properties[number] = kind | {"description": f"The same as `{name}`{words}."}
+        for number, words in more.items():
+            properties[number] = {"type": ["integer", "null"], "description": words}
+        schema["required"] = [name for name in schema["required"] if name not in numbers.values()]
+
+    return add
+
+
 class GaugeIn(Body):
-    """A calibration against a gauge of known size, as L92 makes it. R numbers may stand in place of names (`"R33": 0.001`)."""
+    """A calibration against a gauge of known size, as L92 makes it. R numbers may stand in place of names (`"R33": 0.001`).
+
+    Needed, by name or number, are R11, R32, R33, R34, R36.
+    """
+
+    model_config = ConfigDict(
+        json_schema_extra=_schema_with(
+            R_NAMES, {"R21": "1: a free surface, with R23 = 0; 0: a reference groove.", "R23": "0: a free surface."}
+        )
+    )
 
     average_memory: Annotated[
         int, Field(strict=True, ge=1, le=MOST_LOCATIONS, description="R11: whose empirical value is found (R46).")
@@ -118,8 +149,10 @@ class RingSectionIn(Body):
 class RingIn(Body):
     """A calibration in a ring on the spindle, as the macro of the lathe line makes it.
 
-    The macro's variables may stand in place of names (`"#502": 6.0`).
+    The macro's variables may stand in place of names (`"#502": 6.0`); nominal, both deviations and the tip are needed.
     """
+
+    model_config = ConfigDict(json_schema_extra=_schema_with(MACRO_NAMES, {}))
 
     tool_memory: Annotated[
         int, Field(strict=True, ge=1, le=MOST_LOCATIONS, description="The location that holds the probe's offset.")
