@@ -64,12 +64,13 @@ def _schema_with(numbers: dict[str, str], more: dict[str, str]) -> Callable[[dic
         properties = schema["properties"]
         for number, name in numbers.items():
             codes = R_CODES.get(number)
-            kind = {"type": ["integer", "string", "null"]} if codes else dict(properties[name])
+            types = [{"type": "integer"}, {"type": "string"}, {"type": "null"}]
+            kind = {"anyOf": types} if codes else dict(properties[name])
             kind.pop("default", None)  # stands at the name
             words = ": " + ", ".join(f"{code} is {choice}" for code, choice in codes.items()) if codes else ""
             properties[number] = kind | {"description": f"The same as `{name}`{words}."}
         for number, words in more.items():
-            properties[number] = {"type": ["integer", "null"], "description": words}
+            properties[number] = {"anyOf": [{"type": "integer"}, {"type": "null"}], "description": words}
         schema["required"] = [name for name in schema["required"] if name not in numbers.values()]
 
     return add
@@ -130,6 +131,11 @@ class GaugeIn(Body):
         fields = _by_number(value, R_NAMES)
         if isinstance(fields, dict) and ("R21" in fields or "R23" in fields):
             r21, r23 = fields.pop("R21", None), fields.pop("R23", None)
+            for number, code in (("R21", r21), ("R23", r23)):
+                if code is not None and (not isinstance(code, int) or isinstance(code, bool)):
+                    raise PydanticCustomError(
+                        "no_code", _("{number} must be a whole number").format(number=number), {"at": number}
+                    )
             groove = r23 not in {0, None} or r21 == 0
             if (r21 == 1 and groove) or "surface" in fields:
                 raise PydanticCustomError(

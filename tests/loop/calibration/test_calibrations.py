@@ -232,6 +232,8 @@ class TestRefused:
             ({"repeats": 2}, "touches"),
             ({"touches": ["199.852"]}, "touches[0]"),
             ({"touches": None}, "touches"),
+            ({"R21": "1"}, "R21"),
+            ({"R23": []}, "R23"),
             ({"average_memory": 0}, "average_memory"),
             ({"average_memory": 21}, "average_memory"),
             ({"weighting_factor": 0.5}, "weighting_factor"),
