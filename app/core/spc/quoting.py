@@ -123,7 +123,13 @@ def quoting_of(values: Floats, limits: Limits) -> Quoting:
 
 
 def fit_if_needed(
-    values: Floats, limits: Limits, indices: Capability | Refused, *, side: int = 0, confidence: float = 0.95
+    values: Floats,
+    limits: Limits,
+    indices: Capability | Refused,
+    *,
+    side: int = 0,
+    confidence: float = 0.95,
+    minimum: int = ENOUGH_READINGS,
 ) -> Fitted | Refused | None:
     """The distribution that fits, or why none does; None where the normal one does. side: of a natural limit, as for `fitted`.
 
@@ -133,7 +139,7 @@ def fit_if_needed(
     normal = not isinstance(indices, Refused) and Caution.NOT_NORMAL not in indices.cautions
     if isinstance(indices, Refused) or (normal and side == 0):
         return None
-    found = or_refused(lambda: fitted(values, limits, side=side, confidence=confidence))
+    found = or_refused(lambda: fitted(values, limits, side=side, confidence=confidence, minimum=minimum))
     if normal and (isinstance(found, Refused) or not found.beats_normal):
         return None
     return found

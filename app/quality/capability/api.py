@@ -6,12 +6,19 @@ from fastapi import Query, Response
 
 from app.access.deps import AnyCaller
 from app.core.spc.fitting import Fitted
+from app.core.spc.machine_performance import RUN
 from app.core.spc.refusal import Refused
 from app.loop.characteristics import queries as characteristics
 from app.quality.capability.figures import CapabilityChart, histogram, probability
+from app.quality.capability.machine_queries import newest_run
 from app.quality.capability.queries import Study
 from app.quality.capability.request import StudyRequestDep, study_of
-from app.quality.capability.schemas import CapabilityOut, capability_out
+from app.quality.capability.schemas import (
+    CapabilityOut,
+    MachinePerformanceOut,
+    capability_out,
+    machine_performance_out,
+)
 from app.web.api import FIGURE, CharacteristicKey, Theme, api_router, chart_answer, problems
 from app.web.deps import FROM_REPLICA, SessionDep
 
@@ -45,6 +52,22 @@ def get_capability(
     """
     current = characteristics.characteristic_for(session, caller, characteristic, "viewer")
     return capability_out(study_of(session, current, choice))
+
+
+@router.get("/characteristics/{characteristic}/machine-performance", responses=problems(404))
+def get_machine_performance(
+    session: SessionDep,
+    caller: AnyCaller,
+    characteristic: CharacteristicKey,
+    choice: StudyRequestDep,
+    readings: Annotated[int, Query(ge=RUN, le=1000, description="Parts of the run.")] = RUN,
+) -> MachinePerformanceOut:
+    """Pm and Pmk of the newest run of parts without a correction, a tool change or a setting in between (ISO 22514-3).
+
+    The run is looked for among the last 5000 readings; `side` and `confidence` are those of capability.
+    """
+    current = characteristics.characteristic_for(session, caller, characteristic, "viewer")
+    return machine_performance_out(newest_run(session, study_of(session, current, choice), readings))
 
 
 @router.get(

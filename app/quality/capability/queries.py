@@ -37,6 +37,7 @@ from app.core.spc.quoting import Quoting, fit_if_needed, or_refused, quoting, st
 from app.core.spc.refusal import Floats, Refused
 from app.core.spc.spread import far_off
 from app.core.spc.stability import Stability
+from app.core.spc.tolerance_interval import ToleranceInterval, tolerance_interval
 from app.core.spc.uncompensated import Uncompensated
 from app.loop.characteristics import queries as characteristics
 from app.loop.characteristics.queries import CurrentCharacteristic
@@ -47,6 +48,7 @@ from app.quality.control_charts.series_queries import read as read_series
 
 __all__ = [
     "CONFIDENCE",
+    "COVERAGE",
     "USUAL",
     "InForce",
     "Judgement",
@@ -60,6 +62,8 @@ __all__ = [
 Side = Literal["both", "upper", "lower"]
 USUAL = USUAL_READINGS
 CONFIDENCE = 0.95
+COVERAGE = 0.9973
+"""Share of the parts that a tolerance interval holds, unless another is asked for: six sigma."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -172,7 +176,7 @@ class Study(Judgement):
 
     excluded: sequences that somebody took out; faults: probe faults. fallout: parts outside the tolerance in force, per
     million; outside: how many. without: None where nothing is compensated; unknown: readings of it that do not say with which
-    corrections they were cut.
+    corrections they were cut. tolerance: the interval that holds a share of all parts.
     """
 
     excluded: list[int]
@@ -185,6 +189,7 @@ class Study(Judgement):
     shapiro: Normality | Refused
     without: Uncompensated | Refused | None
     unknown: int
+    tolerance: ToleranceInterval | Refused
 
 
 def judgement_of(session: Session, current: CurrentCharacteristic, window: Window) -> Judgement:
@@ -200,6 +205,7 @@ def capability_of(
     *,
     side: Side = "both",
     confidence: float = CONFIDENCE,
+    coverage: float = COVERAGE,
 ) -> Study:
     """Judge the readings of the window. Raises `Invalid` for more than ten million."""
     if current.parameters.natural_limit is not NaturalLimit.NONE:
@@ -224,6 +230,16 @@ def capability_of(
         shapiro=or_refused(lambda: normality.shapiro_wilk(_thinned(values))),
         without=without,
         unknown=unknown,
+        tolerance=or_refused(
+            lambda: tolerance_interval(
+                values,
+                coverage,
+                confidence,
+                lower=limits.lower is not None,
+                upper=limits.upper is not None,
+                normal=known is not None and Caution.NOT_NORMAL not in known.cautions,
+            )
+        ),
     )
 
 
@@ -262,8 +278,8 @@ def _judged(
         "confidence": confidence,
         "sequence": counted["sequence"],
         "values": values,
-        "first_at": _moment(at.min()) if len(at) else None,
-        "last_at": _moment(at.max()) if len(at) else None,
+        "first_at": moment(at.min()) if len(at) else None,
+        "last_at": moment(at.max()) if len(at) else None,
         "far": counted["sequence"][far].tolist(),
         "furthest": max(values[far].tolist(), key=abs, default=None),
         "limits": limits,
@@ -296,7 +312,8 @@ def _about_target(
     return np.round(values + shift[counted["parameters_version"]], 9), (same or [p.half])[-1], p.natural_limit
 
 
-def _moment(at: np.datetime64) -> datetime:
+def moment(at: np.datetime64) -> datetime:
+    """A moment of a column, in UTC."""
     moment: datetime = at.astype("datetime64[us]").item()
     return moment.replace(tzinfo=UTC)
 

@@ -12,7 +12,7 @@ from app.language.i18n import _
 from app.loop.characteristics.queries import CurrentCharacteristic
 from app.loop.summaries import queries as statistics
 from app.quality.capability import queries
-from app.quality.capability.queries import CONFIDENCE, USUAL, Side, Study
+from app.quality.capability.queries import CONFIDENCE, COVERAGE, USUAL, Side, Study
 from app.web.choice import InPeriod
 from app.web.fields import LARGEST_ID
 
@@ -24,6 +24,7 @@ class StudyRequest(NamedTuple):
     period: Period
     side: Side
     confidence: float
+    coverage: float = COVERAGE
 
 
 Last = Annotated[
@@ -40,6 +41,9 @@ OneSide = Annotated[
     ),
 ]
 Confidence = Annotated[float, Query(gt=0.5, lt=1, allow_inf_nan=False, description="Of the intervals.")]
+Coverage = Annotated[
+    float, Query(gt=0.5, lt=1, allow_inf_nan=False, description="Share of all parts that the tolerance interval holds.")
+]
 
 
 def study_request(
@@ -47,9 +51,10 @@ def study_request(
     last: Last = None,
     side: OneSide = "both",
     confidence: Confidence = CONFIDENCE,
+    coverage: Coverage = COVERAGE,
 ) -> StudyRequest:
     """The choice of readings, the same for API and figures."""
-    return StudyRequest(last, period, side, confidence)
+    return StudyRequest(last, period, side, confidence, coverage)
 
 
 StudyRequestDep = Annotated[StudyRequest, Depends(study_request)]
@@ -78,4 +83,5 @@ def study_of(session: Session, current: CurrentCharacteristic, choice: StudyRequ
         window,
         side=choice.side,
         confidence=choice.confidence,
+        coverage=choice.coverage,
     )

@@ -13,7 +13,8 @@ from app.core.spc.in_time import InTime
 from app.core.spc.normality import Normality
 from app.core.spc.refusal import Refused
 from app.loop.summaries import wording as statistics
-from app.quality.capability import fit_wording, wording
+from app.quality.capability import fit_wording, machine_wording, wording
+from app.quality.capability.machine_queries import Run
 from app.quality.capability.queries import Study
 from app.web.fields import answer_from
 
@@ -119,6 +120,37 @@ class FittedOut(FitOut):
     ppm: FalloutOut = Field(description="Expected of this distribution.")
     why: str = Field(description="Why this one.")
     tried: list[FitOut] = Field(description="Every distribution that was tried, the best criterion first.")
+
+
+class ToleranceIntervalOut(BaseModel):
+    """Where at least a share of all parts lies, with a confidence (ISO 16269-6), mm from the target."""
+
+    share: float
+    confidence: float
+    method: Literal["normal", "extremes"] = Field(
+        description="By the normal distribution (exact factor), or from the smallest reading to the largest."
+    )
+    low: float | None = Field(description="null where only the upper limit counts.")
+    high: float | None
+    k: float | None = Field(description="Factor of the standard deviation; null by extremes.")
+    reached: float = Field(description="The confidence that was reached; by extremes it is not below `confidence`.")
+
+
+class MachinePerformanceOut(BaseModel):
+    """Pm and Pmk (ISO 22514-3) of the newest run of parts in which nothing was changed."""
+
+    readings: int
+    first_sequence: int | None
+    last_sequence: int | None
+    first_at: datetime | None
+    last_at: datetime | None
+    left_out: int = Field(description="Readings in between that were excluded, or probe faults.")
+    mean: float | None
+    sigma: float | None
+    pm: IndexOut | None
+    pmk: IndexOut | None
+    distribution: Family | None = Field(description="The distribution that they are by; null: normal.")
+    refused: str | None = Field(description="Why there is no Pmk.")
 
 
 class TestOut(BaseModel):
@@ -239,6 +271,9 @@ class CapabilityOut(BaseModel):
     baseline: int | None = Field(description="Version of the frozen baseline it was judged by; null: by themselves.")
     signals: list[FiredOut]
     in_time: InTimeOut | None = Field(description="Of 50 readings and more.")
+    tolerance_interval: ToleranceIntervalOut | None = Field(
+        description="null of too few readings: of those that are not normal it takes so many that the extremes are enough."
+    )
     compensated: bool
     without: WithoutOut | None = Field(description="Only where corrections were in effect.")
     cautions: list[str]
@@ -293,6 +328,9 @@ def capability_out(study: Study) -> CapabilityOut:
             for fired in (judged.fired if judged else ())
         ],
         in_time=_in_time(study, model) if model else None,
+        tolerance_interval=None
+        if isinstance(study.tolerance, Refused)
+        else answer_from(ToleranceIntervalOut, study.tolerance, method=study.tolerance.method.value),
         without=_without(study),
         cautions=wording.cautions(study),
     )
@@ -362,4 +400,27 @@ def _without(study: Study) -> WithoutOut | None:
         scatter=process.ideal_sigma.value,
         ideal=IndexOut.of(process.ideal),
         unknown=study.unknown,
+    )
+
+
+def machine_performance_out(found: Run | Refused) -> MachinePerformanceOut:
+    """The run as JSON."""
+    if isinstance(found, Refused):
+        nothing = dict.fromkeys(MachinePerformanceOut.model_fields) | {"readings": found.have, "left_out": 0}
+        return MachinePerformanceOut(**nothing | {"refused": machine_wording.no_run(found)})
+    result = None if isinstance(found.result, Refused) else found.result
+    fit = result.by_fit if result else None
+    return MachinePerformanceOut(
+        readings=len(found.values),
+        first_sequence=int(found.sequence[0]),
+        last_sequence=int(found.sequence[-1]),
+        first_at=found.first_at,
+        last_at=found.last_at,
+        left_out=found.left_out,
+        mean=result.mean if result else None,
+        sigma=result.sigma if result else None,
+        pm=IndexOut.of(result.pm if result else None),
+        pmk=IndexOut.of(result.pmk if result else None),
+        distribution=fit.fit.family if fit else None,
+        refused=machine_wording.why_none(found),
     )

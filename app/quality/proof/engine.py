@@ -25,6 +25,7 @@ from app.core.spc.in_time import brown_forsythe, decompose, successive
 from app.core.spc.normality import anderson_darling, p_of, shapiro_wilk
 from app.core.spc.rules import RULES, Rule, RuleName, signals, signals_of_cusum
 from app.core.spc.spread import Estimator, Sigma, freedom_of_moving_ranges, from_ranges, subgroups, summary
+from app.core.spc.tolerance_interval import fewest_for_extremes, k_by_howe, k_one_sided, k_two_sided
 from app.core.uncertainty import position_uncertainty
 from app.quality.proof import engine_of_gauges as gauges
 from app.quality.proof import geometry
@@ -251,6 +252,23 @@ def critical_values(given: Given) -> Got:
     return {"p_values": [p_of_anderson_darling(a, Family(given["family"]), row) for a in given["statistics"]]}
 
 
+def tolerance_factors(given: Given) -> Got:
+    """Factors of tolerance intervals, by the number of readings."""
+    factors = {"two_sided": k_two_sided, "one_sided": k_one_sided, "howe": k_by_howe}
+    return {
+        name: [factor(n, given["share"], given["confidence"]) for n in given["readings"]]
+        for name, factor in factors.items()
+    }
+
+
+def tolerance_extremes(given: Given) -> Got:
+    """Number of readings whose extremes hold a share."""
+    return {
+        name: [fewest_for_extremes(share, given["confidence"], sides=sides) for share in given["shares"]]
+        for name, sides in (("both", 2), ("one", 1))
+    }
+
+
 def places(given: Given) -> Got:
     """Ordered readings, counted from 1, that bound a quantile; 0 where none does."""
     found = [order_statistics(given["share"], n, given["confidence"]) for n in given["readings"]]
@@ -322,6 +340,8 @@ ENGINE: dict[str, Callable[[Given], Got]] = {
     "order_statistics": places,
     "distribution": distribution,
     "goodness_of_fit": critical_values,
+    "tolerance_factors": tolerance_factors,
+    "tolerance_extremes": tolerance_extremes,
     "percentile_indices": indices_of_percentiles,
     "anderson_darling": anderson,
     "anderson_p": anderson_p,

@@ -43,6 +43,8 @@ def topics() -> dict[str, tuple[str, tuple[str, ...]]]:
                 "order_statistics",
                 "distribution",
                 "goodness_of_fit",
+                "tolerance_factors",
+                "tolerance_extremes",
                 "anderson_darling",
                 "anderson_p",
                 "shapiro_wilk",

@@ -16,7 +16,8 @@ from app.language.times import plant_zone
 from app.loop.characteristics import queries as characteristics
 from app.loop.summaries import queries as summaries
 from app.loop.summaries import wording as statistics
-from app.quality.capability import fit_wording, wording
+from app.quality.capability import fit_wording, machine_wording, wording
+from app.quality.capability.machine_queries import newest_run
 from app.quality.capability.pictures import interval
 from app.quality.capability.queries import CONFIDENCE, USUAL, Side
 from app.quality.capability.request import Confidence, Last, OneSide, StudyRequest, study_of
@@ -117,6 +118,8 @@ def capability_page(
         refused=lambda value: isinstance(value, Refused),
         wording=wording,
         fits=fit_wording,
+        machine_run=newest_run(session, study) if len(study.values) else None,
+        machines=machine_wording,
         words=statistics,
         gauge_studies=gauges.studies(
             session, machine_id=current.machine.id, characteristic_id=current.characteristic.id, limit=3

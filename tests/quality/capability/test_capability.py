@@ -217,6 +217,45 @@ def test_readings_of_two_states_are_quoted_by_the_distribution_that_fits(shop: S
     assert [each["name"] for each in drawn if each.get("meta") == "fitted"] == ["two normal distributions"]
 
 
+def test_where_all_parts_lie_and_what_the_machine_alone_can_do(shop: Shop) -> None:
+    key = shop.another("machine", mode="measure_only", tool_memory=0)
+    none = shop.call("GET", f"/characteristics/{key}/machine-performance")
+    assert (none["pmk"], none["readings"]) == (None, 0)
+    assert "the longest run has 0" in none["refused"]
+    shop.push(quiet(49, seed=21), key)
+    assert "the longest run has 49" in shop.call("GET", f"/characteristics/{key}/machine-performance")["refused"]
+    shop.push([*quiet(1, seed=22), 7.9, *quiet(10, seed=23)], key)
+    shop.call("POST", f"/readings/{key}/51/exclude", 200, reason="chip under the stylus")
+    run = shop.call("GET", f"/characteristics/{key}/machine-performance")
+    assert (run["readings"], run["first_sequence"], run["last_sequence"], run["left_out"]) == (50, 11, 61, 1)
+    assert run["pm"]["value"] == pytest.approx(0.016 / (6 * run["sigma"]))
+    assert run["pmk"]["low"] < run["pmk"]["value"] <= run["pm"]["value"]
+    found = of(shop, characteristic=key)
+    interval = found["tolerance_interval"]
+    assert (interval["share"], interval["confidence"], interval["method"]) == (0.9973, 0.95, "normal")
+    assert interval["high"] - found["mean"] == pytest.approx(interval["k"] * found["sigma_overall"])
+    assert 3.4 < interval["k"] < 3.7
+    wider = of(shop, "last=all&coverage=0.9999", key)["tolerance_interval"]
+    assert wider["low"] < interval["low"]
+    upper = of(shop, "last=all&side=upper", key)["tolerance_interval"]
+    assert (upper["low"], upper["k"] < interval["k"]) == (None, True)
+    page = shop.admin.get(f"/characteristics/{key}/capability").text
+    assert "at least 99.73 % of all parts lie between" in page
+    assert "50 parts, readings 11 to 61" in page
+    section = shop.call("GET", f"/characteristics/{key}/report.json?section=capability")["sections"][0]
+    assert next(fact for fact in section["facts"] if fact["key"] == "pmk")["value"] == pytest.approx(
+        run["pmk"]["value"]
+    )
+    assert any("99.73 % of all parts" in each for each in section["sentences"])
+
+
+def test_a_correction_ends_the_run_of_a_machine(shop: Shop) -> None:
+    cut(shop, scatter(300, seed=3, sigma=0.5, wear=0.2), delay=0)
+    run = shop.call("GET", f"/characteristics/{shop.characteristic}/machine-performance")
+    assert run["pmk"] is None
+    assert "without a correction" in run["refused"]
+
+
 def test_which_readings(shop: Shop) -> None:
     key = shop.another("chosen", mode="measure_only", tool_memory=0)
     shop.push(quiet(80), key)

@@ -7,8 +7,9 @@ from app.files.documents.content import Fact, Section, count, deviation, number,
 from app.language.i18n import _
 from app.loop.summaries import wording as statistics
 from app.quality.capability import fit_wording as fits
+from app.quality.capability import machine_wording, wording
 from app.quality.capability import queries as capabilities
-from app.quality.capability import wording
+from app.quality.capability.machine_queries import newest_run
 from app.quality.capability.queries import Study
 from app.views.reports.queries.frame import Frame
 
@@ -35,6 +36,7 @@ def capability(frame: Frame) -> Section:
     sentences = [
         verdict,
         _("Of {window}.").format(window=wording.window_of(study)),
+        machine_wording.tolerance(study.tolerance),
         wording.stability(study.stability, study.baseline),
     ]
     if not isinstance(study.in_time, Refused):
@@ -48,7 +50,7 @@ def capability(frame: Frame) -> Section:
         title,
         sentences=tuple(sentences),
         warnings=tuple(wording.cautions(study)),
-        facts=(*_indices(study), *_spread(study), *_without(study)),
+        facts=(*_indices(study), *_machine(frame, study), *_spread(study), *_without(study)),
     )
 
 
@@ -74,6 +76,20 @@ def _indices(study: Study) -> list[Fact]:
         index, name = by_percentile.ppk, _("Ppk by percentiles")
         facts.append(_index("ppk_percentile", name, index, quotable=study.quote == "percentile"))
     return facts
+
+
+def _machine(frame: Frame, study: Study) -> list[Fact]:
+    """Pm and Pmk of the newest run of parts in which nothing was changed, whatever the period of the report."""
+    run = newest_run(frame.session, study)
+    if isinstance(run, Refused) or machine_wording.why_none(run) is not None:
+        return []
+    assert not isinstance(run.result, Refused)
+    note = machine_wording.run_of(run)
+    return [
+        Fact(key, name, number(index.value), note=note, low=number(index.low), high=number(index.high))
+        for key, name, index in (("pm", "Pm", run.result.pm), ("pmk", "Pmk", run.result.pmk))
+        if index is not None
+    ]
 
 
 def _index(key: str, name: str, index: Index, *, quotable: bool = True) -> Fact:

@@ -1,0 +1,75 @@
+"""Machine performance of the newest run of parts that nothing was changed in. Never writes. Lengths in mm."""
+
+from dataclasses import dataclass, field
+from datetime import datetime
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from sqlalchemy.orm import Session
+
+from app.core.spc import machine_performance as core
+from app.core.spc.machine_performance import RUN, MachinePerformance
+from app.core.spc.quoting import or_refused
+from app.core.spc.refusal import Floats, Refused
+from app.loop.summaries import queries as statistics
+from app.quality.capability.queries import Study, moment
+from app.quality.control_charts.series_queries import read
+
+LOOKED_AT = 5000
+"""The newest readings among which a run is looked for."""
+
+
+@dataclass(frozen=True, slots=True)
+class Run:
+    """A run of parts: deviations and their sequences, and the readings in between that somebody excluded, or probe faults."""
+
+    sequence: NDArray[np.int64]
+    values: Floats
+    first_at: datetime
+    last_at: datetime
+    left_out: int
+    result: MachinePerformance | Refused
+
+
+@dataclass(slots=True)
+class _Plan:
+    """Deviations as they are."""
+
+    factor: float
+    quantity: str = "deviation"
+    grouping: str | None = None
+    group_size: int | None = None
+    group_pause: float | None = None
+    first_sequence: int = 0
+    last_sequence: int = 0
+    excluded: list[Any] = field(default_factory=list)
+
+
+def newest_run(session: Session, study: Study, length: int = RUN) -> Run | Refused:
+    """The newest run of so many parts between which no correction came into effect, no tool was changed and nothing was set.
+
+    Of the last 5000 readings, by the limits of the study; a `Refused` says how long the longest run among them is.
+    """
+    current = study.current
+    window = statistics.window_of(session, current.characteristic, last=LOOKED_AT)
+    found = read(session, current, _Plan(current.parameters.factor), window)
+    series, at = found.series, found.measured_at
+    effects = statistics.history_of(session, current.characteristic, window, ("compensated", "parameters_version"))
+    here = np.isin(effects["sequence"], series.sequence)
+    changed = series.begins.copy()
+    for name in ("compensated", "parameters_version"):
+        values = np.nan_to_num(effects[name][here], nan=-1.0)
+        changed[1:] |= values[1:] != values[:-1]
+    try:
+        place = core.newest_run(changed, length)
+    except Refused as refused:
+        return refused
+    sequence, values = series.sequence[place], series.values[place]
+    result = or_refused(
+        lambda: core.machine_performance(
+            values, study.limits, side=study.natural_limit.side, confidence=study.confidence
+        )
+    )
+    left_out = int(sequence[-1] - sequence[0]) + 1 - len(sequence)
+    return Run(sequence, values, moment(at[place][0]), moment(at[place][-1]), left_out, result)

@@ -1,0 +1,78 @@
+"""Tolerance intervals and machine performance: what they hold, and when they are refused."""
+
+import numpy as np
+import pytest
+from scipy.stats import nct, norm
+
+from app.core.spc.capability import Limits
+from app.core.spc.distributions import Family
+from app.core.spc.machine_performance import RUN, machine_performance, newest_run
+from app.core.spc.refusal import Reason, Refused
+from app.core.spc.tolerance_interval import Method, fewest_for_extremes, k_one_sided, k_two_sided, tolerance_interval
+
+
+@pytest.mark.parametrize("n", [2, 5, 30, 300])
+def test_the_one_sided_factor_is_that_of_the_non_central_t(n: int) -> None:
+    for share, confidence in ((0.9, 0.95), (0.9973, 0.9), (0.4, 0.2)):
+        exact = nct.ppf(confidence, n - 1, norm.ppf(share) * n**0.5) / n**0.5
+        assert k_one_sided(n, share, confidence) == pytest.approx(exact, rel=1e-6)
+
+
+def test_the_two_sided_interval_holds_its_share_as_often_as_it_says() -> None:
+    rng, held = np.random.default_rng(3), 0
+    k = k_two_sided(20, 0.95, 0.9)
+    for _ in range(4000):
+        x = rng.normal(size=20)
+        reach = k * x.std(ddof=1)
+        held += norm.cdf(x.mean() + reach) - norm.cdf(x.mean() - reach) >= 0.95
+    assert held / 4000 == pytest.approx(0.9, abs=0.015)
+
+
+def test_without_a_shape_it_takes_the_extremes_or_says_how_many_it_takes() -> None:
+    values = np.random.default_rng(4).exponential(size=93)
+    found = tolerance_interval(values, 0.95, 0.95, normal=False)
+    assert (found.method, found.low, found.high, found.k) == (Method.EXTREMES, values.min(), values.max(), None)
+    assert found.reached >= 0.95
+    with pytest.raises(Refused) as refused:
+        tolerance_interval(values[1:], 0.95, 0.95, normal=False)
+    assert (refused.value.reason, refused.value.have, refused.value.needed) == (Reason.TOO_FEW_READINGS, 92, 93)
+    assert fewest_for_extremes(0.9973, 0.95, sides=2) == 1756
+    upper = tolerance_interval(values, 0.95, 0.95, lower=False, normal=False)
+    assert (upper.low, upper.high) == (None, values.max())
+
+
+def test_a_run_of_a_machine_has_the_indices_of_all_its_parts() -> None:
+    values = np.random.default_rng(5).normal(1, 1.5, RUN)
+    found = machine_performance(values, Limits(-10, 10))
+    s = values.std(ddof=1)
+    assert found.pm
+    assert found.pmk
+    assert found.pm.value == pytest.approx(20 / (6 * s))
+    assert found.pmk.value == pytest.approx((10 - values.mean()) / (3 * s))
+    with pytest.raises(Refused):
+        machine_performance(values[1:], Limits(-10, 10))
+    chip = values.copy()
+    chip[7] = 400.0
+    far = machine_performance(chip, Limits(-10, 10))
+    assert (far.far, far.pm, far.pmk) == ((7,), None, None)
+
+
+def test_a_run_of_form_is_by_the_distribution_that_begins_at_its_natural_limit() -> None:
+    run = machine_performance(np.random.default_rng(6).rayleigh(1, 100), Limits(None, 8.0), side=-1)
+    assert run.by_fit
+    assert run.by_fit.fit.family is Family.RAYLEIGH
+    assert run.pm is None
+    assert run.pmk
+    assert run.pmk.value == pytest.approx((8 - 1.177) / (3.635 - 1.177), rel=0.2)
+
+
+def test_the_newest_run_that_nothing_was_changed_in() -> None:
+    changed = np.zeros(200, np.bool_)
+    changed[[0, 60, 130, 170]] = True
+    assert newest_run(changed, 50) == slice(80, 130)
+    assert newest_run(changed, 70) == slice(60, 130)
+    with pytest.raises(Refused) as refused:
+        newest_run(changed, 71)
+    assert (refused.value.have, refused.value.needed) == (70, 71)
+    with pytest.raises(Refused):
+        newest_run(np.zeros(0, np.bool_), 50)
