@@ -75,8 +75,16 @@ from app.plants.serving import Application, Plants
 from app.quality.capability import actions as capability_actions
 from app.quality.capability import api as capability
 from app.quality.control_charts import api as control
+from app.quality.control_charts import (
+    counts_api,
+    counts_pages,
+    rules_api,
+    rules_pages,
+    signals_actions,
+    signals_api,
+    signals_pages,
+)
 from app.quality.control_charts import pages as control_pages
-from app.quality.control_charts import rules_api, rules_pages, signals_actions, signals_api, signals_pages
 from app.quality.gauge_studies import api as gauges
 from app.quality.gauge_studies import pages as gauge_pages
 from app.quality.proof import api as proof
@@ -142,6 +150,7 @@ ROUTERS: tuple[APIRouter, ...] = (
     report_jobs.router,
     report_points.router,
     control.router,
+    counts_api.router,
     rules_api.router,
     what_if.router,
     signals_api.router,
@@ -180,6 +189,7 @@ ROUTERS: tuple[APIRouter, ...] = (
     overview_pages.router,
     characteristic_pages.router,
     control_pages.router,
+    counts_pages.router,
     rules_pages.router,
     what_if_pages.router,
     signals_pages.router,

@@ -50,6 +50,7 @@ PAGES = {
         "/characteristics/{characteristic}-empty/control/freeze",
         "/characteristics/{characteristic}-watched/control/freeze?first_sequence=1&last_sequence=60&excluded=7%20chip",
     ],
+    "/count-charts": ["/count-charts", "/count-charts?chart=u&size=4&data=3%0A5%0A1%0A4"],
     "/characteristics/{characteristic}/rules": [
         "/characteristics/{characteristic}/rules",
         "/characteristics/{characteristic}-watched/rules?set=nelson&last=200",

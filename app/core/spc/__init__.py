@@ -10,6 +10,7 @@ readings is refused with a `Refusal` that says how many are missing.
     spread       estimates of sigma, each with its degrees of freedom
     shewhart     individuals, moving range, X-bar, R and S charts, unequal subgroups too
     ewma         exponentially weighted and plain moving averages
+    counts       p, np, c, u and Laney's charts of counts
     cusum        tabular cumulative sums with headstart
     rules        the Nelson and the Western Electric rules, all signals as runs of points
     chance       how often they fire though nothing has happened
@@ -18,6 +19,8 @@ readings is refused with a `Refusal` that says how many are missing.
     watch        rules that watch a chart while readings come in
     capability   Cp to Cpm with intervals, parts out of tolerance
     normality    Anderson-Darling, Shapiro-Wilk
+    distributions, mixture, fitting   which distribution fits readings that are not normal, and their indices
+    tolerance_interval, machine_performance   where all parts lie; Pm and Pmk of an undisturbed run
     gauge        type 1, bias, linearity, gauge R&R, and what they say about R33
 """
 

@@ -29,7 +29,7 @@ FEWEST = 2
 
 
 class Method(StrEnum):
-    """How an interval was made."""
+    """The way in which an interval was made."""
 
     NORMAL = "normal"
     EXTREMES = "extremes"
@@ -37,7 +37,7 @@ class Method(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class ToleranceInterval:
-    """Where at least `share` of all parts lies, with `confidence`, in the unit of the readings; None where it has no end.
+    """An interval in which at least `share` of all parts lies, with `confidence`, in the unit of the readings; None where it has no end.
 
     k: factor of the standard deviation, None without a shape. reached: the confidence that the extremes give.
     """

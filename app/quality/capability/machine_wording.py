@@ -57,7 +57,7 @@ def tolerance(found: ToleranceInterval | Refused) -> str:
     'With 95 % confidence at least 99.73 % of all parts lie between −5.1 µm and +4.9 µm (k = 3.643).'
     """
     if isinstance(found, Refused):
-        return statistics.refusal(found)
+        return _("No tolerance interval: {why}").format(why=statistics.refusal(found))
     ends = {"low": signed((found.low or 0.0) * 1000, 1), "high": signed((found.high or 0.0) * 1000, 1)}
     if found.low is None:
         where = _("below {high} µm").format(**ends)

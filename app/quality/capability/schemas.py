@@ -123,7 +123,7 @@ class FittedOut(FitOut):
 
 
 class ToleranceIntervalOut(BaseModel):
-    """Where at least a share of all parts lies, with a confidence (ISO 16269-6), mm from the target."""
+    """An interval in which at least a share of all parts lies, with a confidence (ISO 16269-6), mm from the target."""
 
     share: float
     confidence: float
@@ -406,7 +406,8 @@ def _without(study: Study) -> WithoutOut | None:
 def machine_performance_out(found: Run | Refused) -> MachinePerformanceOut:
     """The run as JSON."""
     if isinstance(found, Refused):
-        nothing = dict.fromkeys(MachinePerformanceOut.model_fields) | {"readings": found.have, "left_out": 0}
+        nothing: dict[str, Any] = dict.fromkeys(MachinePerformanceOut.model_fields)
+        nothing |= {"readings": found.have, "left_out": 0}
         return MachinePerformanceOut(**nothing | {"refused": machine_wording.no_run(found)})
     result = None if isinstance(found.result, Refused) else found.result
     fit = result.by_fit if result else None

@@ -19,6 +19,7 @@ from app.core.spc.capability import (
     spread_index,
     target_index,
 )
+from app.core.spc.counts import CountChart, counts_chart
 from app.core.spc.distributions import Family, quantiles
 from app.core.spc.fitting import fit_of_family, p_of_anderson_darling
 from app.core.spc.in_time import brown_forsythe, decompose, successive
@@ -252,6 +253,15 @@ def critical_values(given: Given) -> Got:
     return {"p_values": [p_of_anderson_darling(a, Family(given["family"]), row) for a in given["statistics"]]}
 
 
+def count_chart(given: Given) -> Got:
+    """Centre, limits of the newest sample, sigma z, and how many samples are outside."""
+    found = counts_chart(CountChart(given["chart"]), given["counts"], given.get("inspected"))
+    return {name: float(getattr(found, name)[-1]) for name in ("centre", "lower", "upper")} | {
+        "sigma_z": found.sigma_z,
+        "outside": int(found.outside.sum()),
+    }
+
+
 def tolerance_factors(given: Given) -> Got:
     """Factors of tolerance intervals, by the number of readings."""
     factors = {"two_sided": k_two_sided, "one_sided": k_one_sided, "howe": k_by_howe}
@@ -327,6 +337,7 @@ ENGINE: dict[str, Callable[[Given], Got]] = {
     "ewma": weighted,
     "moving_average": moving,
     "cusum": summed,
+    "count_chart": count_chart,
     "rule_probability": rule_probability,
     "rule_run_length": rule_run_length,
     "rules_on_data": rules_on_data,

@@ -24,6 +24,7 @@ def topics() -> dict[str, tuple[str, tuple[str, ...]]]:
                 "ewma",
                 "moving_average",
                 "cusum",
+                "count_chart",
                 "rules_on_data",
             ),
         ),
