@@ -93,6 +93,14 @@ def begin_of_shift(at: datetime) -> datetime:
     return next(begin for begin in begins if begin <= there)
 
 
+def begins_of_shifts(first: datetime, last: datetime) -> list[datetime]:
+    """Beginnings of the shifts from the one in which the first moment lies to that of the last, ascending."""
+    begin, end = begin_of_shift(first), local(last)
+    days = (begin.date() + timedelta(day) for day in range((end.date() - begin.date()).days + 1))
+    begins = (datetime.combine(day, at, plant_zone()) for day in days for at in _time().shifts)
+    return [each for each in begins if begin <= each <= end]
+
+
 def is_twice(at: datetime) -> bool:
     """True if the wall clock shows this local time twice, an hour (or less) apart, because it is put back."""
     return at.replace(fold=0).utcoffset() != at.replace(fold=1).utcoffset()

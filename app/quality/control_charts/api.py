@@ -221,6 +221,7 @@ def get_baseline_editor(
     grouping: Annotated[Grouping | None, Query(description="How readings become subgroups.")] = None,
     group_size: Annotated[int | None, Query(ge=2, le=1000, description="Readings in a subgroup.")] = None,
     group_pause: Annotated[float | None, Query(gt=0, le=100_000, description="Minutes that end a subgroup.")] = None,
+    pooled: Annotated[bool, Query(description="Sigma from the pooled variance inside subgroups.")] = False,
     settle: Annotated[int | None, Query(ge=20, le=10_000, description="Readings in which an edge runs in.")] = None,
     first_sequence: Annotated[int | None, Query(ge=1, le=LARGEST_ID, description="First of the period.")] = None,
     last_sequence: Annotated[int | None, Query(ge=1, le=LARGEST_ID, description="Last of the period.")] = None,
@@ -234,7 +235,7 @@ def get_baseline_editor(
     current = characteristics.characteristic_for(session, caller, characteristic, "viewer")
     window = statistics.window_of(session, current.characteristic, **choice._asdict())
     picked = EditorChoice(
-        quantity, chart, grouping, group_size, group_pause, settle, first_sequence, last_sequence, excluded
+        quantity, chart, grouping, group_size, group_pause, pooled, settle, first_sequence, last_sequence, excluded
     )
     view, marked = picture_of(session, current, picked, window)
     return chart_answer(control_figure(view, key=characteristic, marked=marked, width=width, picks=True), theme)

@@ -98,13 +98,17 @@ def _check(given: PeriodIn, newest: int) -> None:
     if given.last_sequence - given.first_sequence >= MOST_READINGS:
         errors.append(FieldError("first_sequence", _("a period holds at most {n} readings").format(n=MOST_READINGS)))
     if given.chart == "individuals":
-        if given.grouping is not None:
-            errors.append(FieldError("grouping", _("is for charts of subgroups; leave it out for individuals")))
+        wrong = [
+            name for name, is_said in (("grouping", given.grouping is not None), ("pooled", given.pooled)) if is_said
+        ]
+        errors += [FieldError(name, _("is for charts of subgroups; leave it out for individuals")) for name in wrong]
     elif given.quantity is Quantity.DIFFERENCES:
         errors.append(FieldError("chart", _("differences are charted one by one: choose individuals")))
     elif given.grouping is None:
         errors.append(
-            FieldError("grouping", _("is missing; choose how readings form subgroups: consecutive, pause or part"))
+            FieldError(
+                "grouping", _("is missing; choose how readings form subgroups: consecutive, pause, part, shift or nest")
+            )
         )
     elif given.grouping == "consecutive" and given.group_size is None:
         errors.append(FieldError("group_size", _("how many readings make a subgroup?")))
@@ -140,7 +144,7 @@ def _check(given: PeriodIn, newest: int) -> None:
 
 
 def _plan(current: CurrentCharacteristic, given: PeriodIn) -> Baseline:
-    settings = given.model_dump(include=set(PeriodIn.model_fields) - {"excluded", "quantity"})
+    settings = given.model_dump(include=set(PeriodIn.model_fields) - {"excluded", "quantity", "pooled"})
     return Baseline(
         **settings,
         quantity=given.quantity.value,
@@ -151,7 +155,7 @@ def _plan(current: CurrentCharacteristic, given: PeriodIn) -> Baseline:
         characteristic_id=current.characteristic.id,
         centre=0.0,
         sigma=1.0,
-        estimator=Estimator.GIVEN.value,
+        estimator=(Estimator.POOLED if given.pooled else Estimator.GIVEN).value,
         freedom=1.0,
         readings=0,
         groups=0,
@@ -180,7 +184,7 @@ def _estimated(
     if baseline.grouping is None:
         return quantity.individuals_of(series.series, which, baseline.slope or 0.0)
     groups = _groups(session, current, baseline, window)
-    limits = shewhart.subgroup_baseline(groups, ESTIMATORS[baseline.chart])
+    limits = shewhart.subgroup_baseline(groups, Estimator.POOLED if baseline.pooled else ESTIMATORS[baseline.chart])
     if which is Quantity.WEAR_RESIDUALS:  # they are about their own edge's level: by design about 0
         return shewhart.Baseline(0.0, limits.sigma, provisional=limits.provisional)
     return limits

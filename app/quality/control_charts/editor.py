@@ -30,6 +30,7 @@ class EditorChoice(NamedTuple):
     grouping: str | None = None
     group_size: int | None = None
     group_pause: float | None = None
+    pooled: bool = False
     settle: int | None = None
     first: int | None = None
     last: int | None = None
@@ -53,6 +54,7 @@ class EditorChoice(NamedTuple):
                 "grouping": self.grouping,
                 "group_size": self.group_size,
                 "group_pause": self.group_pause,
+                "pooled": self.pooled,
                 "settle": self.settle,
                 "first_sequence": self.first,
                 "last_sequence": self.last,

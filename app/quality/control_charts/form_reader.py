@@ -12,7 +12,7 @@ from app.web.forms import by_field, length, whole
 
 WHOLE = ("first_sequence", "last_sequence", "group_size", "settle", "average_span")
 NUMBERS = ("group_pause", "ewma_lambda", "ewma_width", "cusum_k", "cusum_h", "cusum_headstart")
-FIELDS = ("chart", "quantity", "grouping", "ewma_exact", *WHOLE, *NUMBERS, "excluded")
+FIELDS = ("chart", "quantity", "grouping", "pooled", "ewma_exact", *WHOLE, *NUMBERS, "excluded")
 _RUN = re.compile(r"(\d{1,15})(?:\s*[-\N{EN DASH}\N{HYPHEN}]\s*(\d{1,15}))?(?:[\s,;:]+(\S.*))?")
 
 
@@ -25,6 +25,7 @@ def period(form: Mapping[str, str]) -> dict[str, Any]:
         fields["ewma_exact"] = form["ewma_exact"] == "true"
     if form.get("chart", "individuals") != "individuals":
         fields["grouping"] = form.get("grouping")
+        fields["pooled"] = form.get("pooled") == "true"
     if fields.get("grouping") != "consecutive":
         fields["group_size"] = None
     if fields.get("grouping") != "pause":

@@ -276,10 +276,15 @@ def _pictured(typed: Mapping[str, str], choice: Choice) -> dict[str, Any]:
         known = typed.get("quantity") in set(Quantity)
         return choice.query | ({"quantity": typed["quantity"]} if known else {})
     names = ("chart", "grouping", "group_size", "group_pause", "settle", "first_sequence", "last_sequence")
-    values = {name: getattr(period, name) for name in names} | {
-        "quantity": period.quantity.value,
-        "excluded": ",".join(f"{run.first}-{run.last}" for run in period.excluded),
-    }
+    pooled = {"pooled": "true"} if period.pooled else {}
+    values = (
+        {name: getattr(period, name) for name in names}
+        | pooled
+        | {
+            "quantity": period.quantity.value,
+            "excluded": ",".join(f"{run.first}-{run.last}" for run in period.excluded),
+        }
+    )
     return choice.query | {name: value for name, value in values.items() if value not in (None, "")}
 
 

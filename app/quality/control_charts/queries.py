@@ -26,7 +26,7 @@ from app.quality.control_charts.tables import Baseline
 LOOK_BACK = 100_000
 """Readings before the window that are looked through for what its first points need: the beginning of the edge, of the subgroup."""
 LOOK_AHEAD = 1_000
-"""Readings after the window that tell whether its last subgroup, by pause or part, ends in it; by size, so many."""
+"""Readings after the window that tell whether its last subgroup, by pause, part, shift or nest, ends in it; by size, so many."""
 
 
 def baseline_in_force(session: Session, characteristic: Characteristic) -> Baseline | None:
@@ -146,7 +146,7 @@ def _to_read(plan: Plan, window: Window) -> Window:
 
 def _earliest(plan: Plan, window: Window) -> int:
     """From where readings have to be read for the first point of the window to be what it always is."""
-    if plan.quantity == Quantity.WEAR_RESIDUALS or plan.grouping in ("pause", "part"):
+    if plan.quantity == Quantity.WEAR_RESIDUALS or plan.grouping not in (None, "consecutive"):
         return max(1, window.first - LOOK_BACK)
     back = 1 if plan.grouping is None else plan.group_size or 1
     if plan.quantity == Quantity.DIFFERENCES:

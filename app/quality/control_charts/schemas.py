@@ -9,7 +9,7 @@ from app.core.spc.quantity import Quantity
 from app.web.fields import LARGEST_ID, LARGEST_SERIAL, Body, Reason
 
 ChartName = Literal["individuals", "xbar_r", "xbar_s"]
-Grouping = Literal["consecutive", "pause", "part"]
+Grouping = Literal["consecutive", "pause", "part", "shift", "nest"]
 Place = Annotated[int, Field(strict=True, ge=1, le=LARGEST_ID)]
 MOST_EXCLUDED = 100
 
@@ -33,7 +33,14 @@ class PeriodIn(Body):
     last_sequence: Place = Field(description="The last reading of the period.")
     grouping: Grouping | None = Field(
         None,
-        description="For subgroups: so many readings one after the other, a pause that ends one, or the same part.",
+        description="For subgroups: so many readings one after the other, a pause that ends one, or neighbours of the same part, "
+        "shift (as the plant's shifts are set) or nest (spindle, cavity: the `nest` of their context).",
+    )
+    pooled: bool = Field(
+        False,
+        strict=True,
+        description="For subgroups: sigma from the pooled variance inside them, instead of their ranges or s. The surest where "
+        "they differ in size.",
     )
     group_size: int | None = Field(
         None, strict=True, ge=2, le=1000, description="Readings in a subgroup, for `consecutive`."

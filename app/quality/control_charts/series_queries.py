@@ -7,7 +7,7 @@ their part was cut.
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from datetime import datetime
+from datetime import UTC, datetime
 from typing import Any, Protocol
 
 import numpy as np
@@ -18,10 +18,11 @@ from sqlalchemy.orm import Session
 from app.core import wear
 from app.core.decision.limits import FAULT, in_nanometres
 from app.core.spc.quantity import Quantity, Series
+from app.language.times import begins_of_shifts
 from app.loop.characteristics.queries import CurrentCharacteristic
 from app.loop.summaries import queries as statistics
 from app.loop.summaries.queries import Window
-from app.loop.tables.readings import Reading
+from app.loop.tables.readings import Reading, ReadingContext
 from app.loop.tables.tools import ToolEvent
 
 Whole = NDArray[np.int64]
@@ -75,7 +76,7 @@ class LeftOut:
 class ReadingSeries:
     """Readings as a series: D, or w where a rebuilt quantity is wanted. mm; moments in UTC.
 
-    labels: a number for the part that each reading names, 0 where it names none.
+    labels: a number for the part, shift or nest of each reading, by what forms the subgroups; 0 where it names none.
     """
 
     series: Series
@@ -101,7 +102,11 @@ def read(session: Session, current: CurrentCharacteristic, plan: Plan, window: W
         keep &= ~unknown
         values = wear.wear(values, history["compensated"], plan.factor)
     begins = _begins(session, current, history["received_at"], history["measured"] - history["deviation"])
-    labels = _labels(session, current, window, sequence) if plan.grouping == "part" else np.zeros_like(sequence)
+    labels = np.zeros_like(sequence)
+    if plan.grouping == "shift":
+        labels = _shifts(history["measured_at"])
+    elif plan.grouping in ("part", "nest"):
+        labels = _labels(session, current, window, sequence, plan.grouping)
     left_out = LeftOut(sequence[history.excluded], sequence[by_plan], sequence[faults], sequence[unknown])
     return ReadingSeries(
         Series(sequence, values, begins).only(keep), history["measured_at"][keep], labels[keep], left_out
@@ -140,11 +145,29 @@ def _naive(moment: datetime) -> np.datetime64:
     return np.datetime64(moment.replace(tzinfo=None), "us")
 
 
-def _labels(session: Session, current: CurrentCharacteristic, window: Window, sequence: Whole) -> Whole:
-    """Changes of the part that readings name, as numbers that grow; 0 where none is named."""
-    before = func.lag(Reading.part).over(order_by=Reading.sequence)
+def _shifts(measured_at: Moments) -> Whole:
+    """Shifts of the plant in which these moments lie, as numbers from 1 that grow with time."""
+    if not len(measured_at):
+        return np.zeros(0, np.int64)
+    ends = (
+        moment.astype("datetime64[us]").item().replace(tzinfo=UTC) for moment in (measured_at.min(), measured_at.max())
+    )
+    begins = [_naive(begin.astimezone(UTC)) for begin in begins_of_shifts(*ends)]
+    return np.searchsorted(np.array(begins), measured_at, side="right").astype(np.int64)
+
+
+def _labels(session: Session, current: CurrentCharacteristic, window: Window, sequence: Whole, by: str) -> Whole:
+    """Changes of the part, or nest, that readings name, as numbers that grow; 0 where none is named."""
+    name = Reading.part if by == "part" else ReadingContext.context["nest"].astext
+    before = func.lag(name).over(order_by=Reading.sequence)
     named = (
-        select(Reading.sequence, Reading.part, before.label("before"))
+        select(Reading.sequence, name.label("name"), before.label("before"))
+        .outerjoin(
+            ReadingContext,
+            (ReadingContext.machine_id == Reading.machine_id)
+            & (ReadingContext.characteristic_id == Reading.characteristic_id)
+            & (ReadingContext.sequence == Reading.sequence),
+        )
         .where(
             Reading.machine_id == current.machine.id,
             Reading.characteristic_id == current.characteristic.id,
@@ -153,8 +176,8 @@ def _labels(session: Session, current: CurrentCharacteristic, window: Window, se
         .subquery()
     )
     rows = session.execute(
-        select(named.c.sequence, named.c.part.is_not(None))
-        .where(named.c.part.is_distinct_from(named.c.before))
+        select(named.c.sequence, named.c.name.is_not(None))
+        .where(named.c.name.is_distinct_from(named.c.before))
         .order_by(named.c.sequence)
     ).all()
     starts: Sequence[int] = [row[0] for row in rows]
@@ -194,9 +217,9 @@ def groups_of(plan: Plan, series: ReadingSeries, window: Window) -> tuple[Whole,
 
 def _parted(plan: Plan, series: ReadingSeries) -> Whole:
     new = np.ones(len(series.labels), np.bool_)
-    if plan.grouping == "part":
-        new[1:] = (np.diff(series.labels) != 0) | (series.labels[1:] == 0)
-    else:
+    if plan.grouping == "pause":
         pause = np.timedelta64(round((plan.group_pause or 0) * 60e6), "us")
         new[1:] = np.diff(series.measured_at) > pause
+    else:
+        new[1:] = (np.diff(series.labels) != 0) | (series.labels[1:] == 0)
     return np.cumsum(new)

@@ -6,6 +6,7 @@ from typing import Any
 from sqlalchemy import BigInteger, CheckConstraint, ForeignKeyConstraint, Index, func, text
 from sqlalchemy.orm import Mapped, mapped_column
 
+from app.core.spc.spread import Estimator
 from app.db.base import Base
 
 
@@ -40,7 +41,7 @@ class Baseline(Base):
     key: Mapped[str | None]  # sent with it: the same key again freezes nothing new
     chart: Mapped[str]
     quantity: Mapped[str]
-    grouping: Mapped[str | None]  # consecutive, pause or part; None for individuals
+    grouping: Mapped[str | None]  # consecutive, pause, part, shift or nest; None for individuals
     group_size: Mapped[int | None]  # consecutive: readings in a subgroup
     group_pause: Mapped[float | None]  # pause: minutes without a reading that end a subgroup
     ewma_lambda: Mapped[float]
@@ -73,3 +74,8 @@ class Baseline(Base):
     retired_at: Mapped[datetime | None]
     retired_by: Mapped[str | None]
     retired_why: Mapped[str | None]
+
+    @property
+    def pooled(self) -> bool:
+        """Tell if sigma was made of the pooled variance inside the subgroups."""
+        return self.estimator == Estimator.POOLED

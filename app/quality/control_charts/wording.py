@@ -143,6 +143,10 @@ def grouping(baseline: Baseline) -> str:
             return _("until a pause of {minutes} min").format(minutes=f"{baseline.group_pause:g}")
         case "part":
             return _("readings of the same part")
+        case "shift":
+            return _("readings of the same shift")
+        case "nest":
+            return _("neighbours of the same nest or spindle")
         case _:
             return ""
 

@@ -95,6 +95,19 @@ class TestByHand:
         again = frozen(gauged, 1, 40, chart="xbar_s", grouping="consecutive", group_size=2)
         assert again["sigma"] * 1000 == pytest.approx(sqrt(2) / (sqrt(2) / sqrt(pi)) / 1), "s/c4, c4 = sqrt(2/pi)"
 
+    def test_sigma_of_subgroups_may_be_pooled(self, gauged: Shop) -> None:
+        """Pairs with s of sqrt(2) and 3 sqrt(2): pooled sqrt((2 + 18) / 2) = sqrt(10), by their ranges (2 + 6) / 2 / d2."""
+        gauged.push([0, 2, 1, 7] * 10)
+        pairs: dict[str, Any] = {"grouping": "consecutive", "group_size": 2}
+        assert frozen(gauged, 1, 40, chart="xbar_r", **pairs)["sigma"] * 1000 == pytest.approx(4 / D2)
+        for chart in ("xbar_r", "xbar_s"):
+            made = frozen(gauged, 1, 40, chart=chart, pooled=True, **pairs)
+            assert (made["estimator"], made["degrees_of_freedom"]) == ("pooled", 20)
+            assert made["sigma"] * 1000 == pytest.approx(sqrt(10))
+        again = frozen(gauged, 1, 40, chart="xbar_s", pooled=True, key="once", **pairs)
+        repeated = frozen(gauged, 1, 40, status=200, chart="xbar_s", pooled=True, key="once", **pairs)
+        assert repeated["version"] == again["version"]
+
     def test_ewma_cusum_and_moving_average_begin_behind_the_baseline(self, gauged: Shop) -> None:
         gauged.push([0, 1] * 20)
         made = frozen(gauged, 1, 40, ewma_lambda=0.5, cusum_h=4, cusum_headstart=2, average_span=2)
@@ -216,6 +229,7 @@ class TestRefused:
             ({"chart": "xbar_s", "grouping": "pause"}, "group_pause"),
             ({"chart": "xbar_r", "grouping": "consecutive", "group_size": 5}, "last_sequence"),
             ({"chart": "individuals", "grouping": "part"}, "grouping"),
+            ({"chart": "individuals", "pooled": True}, "pooled"),
             ({"chart": "xbar_r", "quantity": "differences", "grouping": "part"}, "chart"),
             ({"cusum_h": 4, "cusum_headstart": 4}, "cusum_headstart"),
             ({"ewma_lambda": 0}, "ewma_lambda"),
@@ -322,6 +336,18 @@ class TestLeftOut:
             assert shown["points"]["size"] == sizes[:-1], "the last one may still grow"
             assert shown["waiting"] == sizes[-1]
             assert control(gauged, last="all", chart="deviations")["points"]["size"] == [n for n in sizes[:-1] if n > 1]
+
+    def test_subgroups_by_shift_and_by_nest(self, gauged: Shop) -> None:
+        """A reading an hour: eight a shift. Spindles take turns by two and three; without a spindle each stands alone."""
+        rng = Random(3)
+        moments = [f"2026-10-{1 + hour // 24:02d}T{hour % 24:02d}:15:00Z" for hour in range(240)]
+        nests = [1, 1, 2, 2, 2, None] * 40
+        contexts = [{"nest": nest} if nest else {} for nest in nests]
+        gauged.push([rng.gauss(0, 1) for _ in moments], measured_at=moments, context=contexts)
+        frozen(gauged, 1, 230, chart="xbar_s", grouping="shift", pooled=True)
+        assert set(control(gauged, last="all")["points"]["size"][1:-2]) == {8}
+        frozen(gauged, 1, 240, chart="xbar_r", grouping="nest")
+        assert control(gauged, last="all")["points"]["size"] == [2, 3, 1] * 40
 
 
 class TestCompensated:
