@@ -73,8 +73,11 @@ class TestByHand:
             inside = [(s["rule"], s["first"], s["last"]) for s in shown["signals"] if s["last"] >= 31]
             assert inside == [], chart
         assert 31 not in control(gauged, chart="moving_range", first=20)["points"]["last"]
-        tried = gauged.call("GET", f"{path}/preview?last=45")
+        tried = gauged.call("GET", f"{path}/preview?last=40")
         assert {each["signals"] for each in tried["rules"] if each["do"]} == {0}
+        tried = gauged.call("GET", f"{path}/preview?last=70")["rules"]
+        (side,) = [each for each in tried if (each["place"], each["rule"]) == ("main", "nelson_2")]
+        assert (side["signals"], side["points_inside"]) == (1, 30), "the run ends where the other process ended"
         gauged.push([6.5] * 9)
         after = [(s["rule"], s["first"], s["last"]) for s in control(gauged, first=31)["signals"]]
         assert after == [("nelson_2", 71, 79)], "as the job stores it, without the reading before it"
