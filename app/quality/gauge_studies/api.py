@@ -5,6 +5,8 @@ from typing import Annotated, Literal
 from fastapi import Path, Query, Response
 
 from app.access.deps import AnyCaller, Engineer
+from app.errors import Invalid
+from app.language.i18n import _
 from app.loop.characteristics.queries import characteristic_for, characteristic_named
 from app.loop.machines.queries import machine_for, machine_named
 from app.quality.gauge_studies import actions, queries
@@ -24,7 +26,12 @@ Revision = Annotated[int | None, Query(ge=1, description="Of this revision; of t
 @router.post("/gauge-studies", status_code=201, responses=problems(404, 409) | sent_again(StudyOut))
 def add_gauge_study(session: SessionDep, caller: AnyCaller, given: StudyIn, response: Response) -> StudyOut:
     """Keep a gauge study with all its values, and answer what it says."""
-    machine = machine_for(session, caller, given.machine, "operator")
+    if given.machine is not None:
+        machine = machine_for(session, caller, given.machine, "operator")
+    elif given.characteristic is not None:
+        machine = characteristic_for(session, caller, given.characteristic, "operator").machine
+    else:
+        raise Invalid.at("machine", _("name the machine, or a characteristic of it"))
     result = actions.add_study(session, machine, given, caller)
     response.status_code = 200 if result.again else 201
     return study_out(result.row, queries.advice(session, result.row))

@@ -118,6 +118,8 @@ def pasted_grid(kind: str, form: Mapping[str, str]) -> tuple[dict[str, str], Gri
         texts = [as_typed(value) for value in single] + [""] * (lines * PER_LINE - len(single))
         cells = [texts[at : at + PER_LINE] for at in range(0, len(texts), PER_LINE)]
         return typed | {"lines": str(lines), "table": ""}, grid._replace(cells=cells)
+    if kind == "grr" and heading and (long := table_reader.long_columns(heading)):
+        return _long_grid(typed, body, first, long)
     columns = max(map(len, body))
     operators = operators_of(typed["operators"]) if kind == "grr" else []
     named = _has_names(kind, body, columns, max(1, len(operators)))
@@ -131,6 +133,29 @@ def pasted_grid(kind: str, form: Mapping[str, str]) -> tuple[dict[str, str], Gri
     grid = shape(kind, typed)
     cells = [[as_typed(value) for value in row] + [""] * (width - len(row)) for row in values]
     return typed, grid._replace(names=names or grid.names, cells=cells)
+
+
+def _long_grid(
+    typed: dict[str, str], body: Sequence[Sequence[str]], first: int, long: table_reader.Long
+) -> tuple[dict[str, str], Grid]:
+    """The grid of a table with one row a reading, or a part and an operator in each: trials in the order of the rows."""
+    cells: dict[tuple[str, str], list[str]] = {}
+    for at, row in enumerate(body, first):
+        padded = [*row, *[""] * (1 + max(long.part, long.operator, *long.sizes) - len(row))]
+        part, operator = padded[long.part], padded[long.operator]
+        if not part or not operator:
+            raise _wrong("table", _("row {row}: part or operator is empty").format(row=at))
+        for place in long.sizes:
+            [[size]] = _numbers([[padded[place]]], at, place + 1)
+            cells.setdefault((part, operator), []).extend([] if size is None else [as_typed(size)])
+    parts, operators = (list(dict.fromkeys(names)) for names in zip(*cells, strict=True))
+    trials = max(map(len, cells.values()))
+    typed |= {"lines": str(len(parts)), "trials": str(trials), "operators": ", ".join(operators), "table": ""}
+    grid = shape("grr", typed)
+    filled = {name: values + [""] * (trials - len(values)) for name, values in cells.items()}
+    nothing = [""] * trials
+    rows = [[text for operator in operators for text in filled.get((part, operator), nothing)] for part in parts]
+    return typed, grid._replace(names=parts, cells=rows)
 
 
 def _has_names(kind: str, body: Sequence[Sequence[str]], columns: int, operators: int) -> bool:

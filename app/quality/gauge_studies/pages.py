@@ -118,7 +118,7 @@ def send_new(request: Request, session: SessionDep, caller: Operator, form: Form
             fields = {"kind": kind, "rows": form_reader.rows_of(kind, form_reader.stored_grid(kind, typed))}
             named = {"machine": typed.get("machine"), "characteristic": typed.get("characteristic")}
             study = parsed(StudyIn, form_reader.settings_of(typed) | named | fields)
-            machine = machines.machine_named(session, study.machine)
+            machine = machines.machine_named(session, study.machine or "")
             source = _source(session, kind, typed, study)
             result = actions.add_study(session, machine, study, caller, source)
     except InbandError as error:

@@ -2,7 +2,7 @@
 
 from typing import Annotated, Literal
 
-from pydantic import Field
+from pydantic import AfterValidator, Field
 
 from app.core.parameters import LARGEST_LENGTH
 from app.web.fields import LARGEST_ID, LARGEST_SERIAL, Body, Reason, RecordKey, Slug, Text200
@@ -32,6 +32,28 @@ class RowIn(Body):
     )
 
 
+def _in_cells(rows: list[RowIn]) -> list[RowIn]:
+    """Rows of one value each are readings, one after the other: those of one part and operator make a cell."""
+    if any(row.part is None or row.operator is None or len(row.values) > 1 for row in rows):
+        return rows
+    cells: dict[tuple[str | None, str | None], RowIn] = {}
+    for row in rows:
+        cell = cells.setdefault((row.part, row.operator), row.model_copy(update={"values": []}))
+        cell.values.extend(row.values)
+    return list(cells.values())
+
+
+Rows = Annotated[
+    list[RowIn],
+    AfterValidator(_in_cells),
+    Field(
+        min_length=1,
+        max_length=MOST_ROWS,
+        description="One row for each cell; of gauge R&R also one for each reading, in order of time.",
+    ),
+]
+
+
 class SettingsIn(Body):
     """Subject and settings of a study."""
 
@@ -55,9 +77,9 @@ class StudyIn(SettingsIn):
     """A gauge study with all its values."""
 
     kind: StudyKind = Field(description="type_one: Cg, Cgk. bias. linearity. grr: repeatability and reproducibility.")
-    machine: Slug = Field(examples=["lathe-1"])
+    machine: Slug | None = Field(None, description="If left out, that of the characteristic.", examples=["lathe-1"])
     characteristic: Slug | None = Field(None, description="Which the study is to serve.", examples=["shaft-d40"])
-    rows: list[RowIn] = Field(min_length=1, max_length=MOST_ROWS)
+    rows: Rows
     key: RecordKey | None = None
 
 
@@ -81,7 +103,7 @@ class FromReadingsIn(SettingsIn):
 class CorrectionIn(SettingsIn):
     """A study put right: settings and all values anew, and why. The revision before stays on record."""
 
-    rows: list[RowIn] = Field(min_length=1, max_length=MOST_ROWS)
+    rows: Rows
     reason: Reason
     seen_revision: Annotated[int, Field(strict=True, ge=1, le=LARGEST_SERIAL)] | None = Field(
         None, description="The revision that is put right: 409 if there is a newer one meanwhile."

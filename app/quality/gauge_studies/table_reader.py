@@ -6,12 +6,34 @@ with separators of thousands is refused. µm and mm behind a number are not read
 
 import csv
 import io
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
+from typing import NamedTuple
 
 from app.core.number_text import number_or_none
+from app.files.formats.cell_values import folded
 from app.language.i18n import _
+from app.loop.readings.importing.layout import NAMES
 
 MOST_CHARACTERS = 400_000
+_PARTS = {*map(folded, NAMES["part"]), "parts", "teile", "delovi", "kosi", "sample"}
+_SIZES = {*map(folded, NAMES["measured"]), "measurements", "response", "messung", "messwerte"}
+_OPERATORS = {
+    "operator",
+    "operators",
+    "appraiser",
+    "appraisers",
+    "inspector",
+    "prufer",
+    "bediener",
+    "operater",
+    "operateri",
+    "merilac",
+    "meritelj",
+    "оператор",
+    "контролер",
+    "оператер",
+    "мерилац",
+}
 
 
 class Unreadable(ValueError):
@@ -72,6 +94,33 @@ def numbers(cells: Sequence[Sequence[str]]) -> list[list[float | None]]:
             values.append(value)
         table.append(values)
     return table
+
+
+class Long(NamedTuple):
+    """The columns of a table with one row a reading: places of part, operator and sizes."""
+
+    part: int
+    operator: int
+    sizes: tuple[int, ...]
+
+
+def long_columns(heading: Sequence[str]) -> Long | None:
+    """The columns of such a table by their names in five languages; None where part or operator is none of them.
+
+    >>> long_columns(["RunOrder", "Parts", "Operators", "Measurement"]), long_columns(["Operator", "Part", "M1", "M2"])
+    (Long(part=1, operator=2, sizes=(3,)), Long(part=1, operator=0, sizes=(2, 3)))
+    """
+    names = [folded(each) for each in heading]
+
+    def place(words: Collection[str]) -> int | None:
+        return next((at for at, name in enumerate(names) if name in words), None)
+
+    part, operator, size = place(_PARTS), place(_OPERATORS), place(_SIZES)
+    if part is None or operator is None:
+        return None
+    others = tuple(at for at in range(len(names)) if at not in {part, operator})
+    sizes = others if size is None else (size,)
+    return Long(part, operator, sizes) if sizes else None
 
 
 def is_heading(row: Sequence[str]) -> bool:

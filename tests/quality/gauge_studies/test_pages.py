@@ -108,6 +108,21 @@ class TestPasted:
         (anova,) = [each for each in newest(shop)["grr"] if each["method"] == "anova"]
         assert anova["components"][0]["percent"] == pytest.approx(27.86, abs=0.005)
 
+    @pytest.mark.parametrize("wide", [False, True])
+    def test_a_table_with_one_row_a_reading_becomes_the_grid(self, shop: Shop, operator: Person, *, wide: bool) -> None:
+        sizes = {(p, o): (f"40.0{p}{at}1", f"40.0{p}{at}2") for p in (1, 2, 3) for at, o in enumerate("AB")}
+        lines = ["Operator,Part,M1,M2"] if wide else ["RunOrder,Part,Operator,Measurement"]
+        for (part, who), pair in sizes.items():
+            lines += (
+                [f"{who},{part},{','.join(pair)}"]
+                if wide
+                else [f"{n},{part},{who},{one}" for n, one in enumerate(pair)]
+            )
+        page = operator.send("/gauges/new", 200, **form(shop, "grr", do="paste", table="\n".join(lines)))
+        found = [[cell(page, f"c_{row}_{column}") for column in range(4)] for row in range(3)]
+        assert found == [[*sizes[p, "A"], *sizes[p, "B"]] for p in (1, 2, 3)]
+        assert cell(page, "name_2") == "3"
+
     def test_a_table_is_stored_as_it_was_pasted_while_nothing_stands_in_the_grid(
         self, shop: Shop, operator: Person
     ) -> None:

@@ -122,6 +122,25 @@ class TestPublished:
 
 
 class TestHalfStudies:
+    LONG = (
+        (1, "A 40.0123 40.0093 B 40.0104 40.0101 C 40.0108 40.0086"),
+        (2, "A 40.0196 40.0192 B 40.0189 40.0192 C 40.0195 40.0197"),
+        (3, "A 40.0291 40.0304 B 40.0295 40.0268 C 40.0312 40.0296"),
+    )
+
+    def test_one_row_a_reading_is_the_same_study(self, shop: Shop) -> None:
+        cells = [
+            {"part": str(part), "operator": operator, "values": [float(one), float(two)]}
+            for part, text in self.LONG
+            for operator, one, two in zip(*[iter(text.split())] * 3, strict=True)
+        ]
+        long = [cell | {"values": [value]} for cell in cells for value in cell["values"]]
+        of_cells = send(shop, "grr", cells, characteristic=shop.characteristic)
+        body = {"kind": "grr", "gauge": "Probe", "characteristic": shop.characteristic, "rows": long}
+        study = shop.call("POST", "/gauge-studies", 201, **body)  # the machine is that of the characteristic
+        assert study["grr"] == of_cells["grr"]
+        assert "machine" in refused(shop.call("POST", "/gauge-studies", 422, kind="grr", gauge="P", rows=long))
+
     def test_unequal_trials_are_refused_by_name_or_cut_if_that_is_wanted(self, shop: Shop) -> None:
         rows = aiag()
         rows[12]["values"].pop()
