@@ -26,6 +26,7 @@ if TYPE_CHECKING:
     from app.loop.readings.importing.cells import Flaw
     from app.loop.readings.importing.history import Flawed, Summary
     from app.loop.readings.importing.layout import Layout, Wishes
+    from app.loop.readings.importing.wide import ColumnResult
 
 SINCE, UNTIL = (
     "Measured at this moment or later; a day begins at midnight.",
@@ -139,7 +140,8 @@ Columns = Annotated[
     str,
     typer.Option(
         envvar="INBAND_COLUMNS",
-        help="In place of --characteristic, for a wide sheet: D35=shaft-d35,D40=shaft-d40, a column for each.",
+        help="In place of --characteristic, for a wide sheet: D35=shaft-d35,D40=shaft-d40, a column for each; for a table "
+        "whose rows name their characteristic those names.",
     ),
 ]
 
@@ -181,8 +183,8 @@ def import_file(
     """Import readings from a file: all of them or none. They are history: judged, but they correct nothing."""
     from app.loop.readings.importing.actions import import_readings
     from app.loop.readings.importing.history import Flawed
-    from app.loop.readings.importing.layout import look
-    from app.loop.readings.importing.wide import Column, ColumnResult, columns_said, import_wide
+    from app.loop.readings.importing.layout import look, refuse_incomplete
+    from app.loop.readings.importing.wide import Column, ColumnResult, columns_known, columns_said, import_wide
 
     if aqdef.is_aqdef(file):
         if live:
@@ -191,11 +193,11 @@ def import_file(
         given = {"mapping": mapping, "characteristic": characteristic, "create_missing": create_missing}
         _import_aqdef(file, chosen, data_dir, database_url, machine=machine, dry_run=dry_run, **given)
         return
-    if bool(characteristic) == bool(columns):
+    if characteristic and columns:
         raise typer.BadParameter(
             _("Name one characteristic, or the columns of several."), param_hint="--characteristic"
         )
-    if columns and live:
+    if live and not characteristic:
         raise typer.BadParameter(_("A wide sheet is imported as history only."), param_hint="--live")
     wishes = replace(
         wishes_of(mapping, delimiter, decimal, unit, timezone, time_format, encoding),
@@ -210,12 +212,19 @@ def import_file(
         existing(settings_from(data_dir=data_dir, database_url=database_url)) as database,
         _bar(file) as bar,
     ):
-        layout = look(path, wishes, file.name, complete=not columns)
-        _tell(layout, wide=bool(columns))
+        layout = look(path, wishes, file.name, complete=bool(characteristic))
+        if not (characteristic or columns or layout.names):
+            raise typer.BadParameter(
+                _("Name one characteristic, or the columns of several."), param_hint="--characteristic"
+            )
+        if layout.names:
+            refuse_incomplete(layout)
+        _tell(layout, wide=not characteristic)
         how: dict[str, Any] = {"actor": actor, "source": file.name, "dry_run": dry_run, "progress": bar}
         try:
-            if columns:
-                results = import_wide(database, columns_said(columns, layout), path, layout, unit=wishes.unit, **how)
+            if not characteristic:
+                several = columns_said(columns, layout) or columns_known(database, layout)
+                results = import_wide(database, several, path, layout, unit=wishes.unit, **how)
             else:
                 summary = import_readings(database, characteristic, path, layout, live=live, **how)
                 results = [ColumnResult(Column(0, characteristic), summary)]
@@ -223,15 +232,21 @@ def import_file(
             report(refusal)
             raise typer.Exit(1) from None
     with in_zone(_zone(timezone)):
-        for column, result, trouble in results:
-            if result is not None:
-                _sum_up(result, column.characteristic, live=live, dry_run=dry_run)
-            elif isinstance(trouble, Flawed):
-                report(trouble)
-            elif trouble is not None:
-                say(f"{column.characteristic}: {trouble.detail} {trouble.what_to_do or ''}", style="bold red")
+        _sum_up_all(results, live=live, dry_run=dry_run)
     if any(trouble is not None for _column, _result, trouble in results):
         raise typer.Exit(1)
+
+
+def _sum_up_all(results: "Iterable[ColumnResult]", *, live: bool, dry_run: bool) -> None:
+    from app.loop.readings.importing.history import Flawed
+
+    for column, result, trouble in results:
+        if result is not None:
+            _sum_up(result, column.characteristic, live=live, dry_run=dry_run)
+        elif isinstance(trouble, Flawed):
+            report(trouble)
+        elif trouble is not None:
+            say(f"{column.characteristic}: {trouble.detail} {trouble.what_to_do or ''}", style="bold red")
 
 
 def _import_aqdef(

@@ -136,7 +136,7 @@ class TestHalfStudies:
         ]
         long = [cell | {"values": [value]} for cell in cells for value in cell["values"]]
         of_cells = send(shop, "grr", cells, characteristic=shop.characteristic)
-        body = {"kind": "grr", "gauge": "Probe", "characteristic": shop.characteristic, "rows": long}
+        body: dict[str, Any] = {"kind": "grr", "gauge": "Probe", "characteristic": shop.characteristic, "rows": long}
         study = shop.call("POST", "/gauge-studies", 201, **body)  # the machine is that of the characteristic
         assert study["grr"] == of_cells["grr"]
         assert "machine" in refused(shop.call("POST", "/gauge-studies", 422, kind="grr", gauge="P", rows=long))

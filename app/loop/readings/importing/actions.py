@@ -7,6 +7,7 @@ from pathlib import Path
 from app.db.engine import Database
 from app.errors import Conflict, Invalid, NotFound
 from app.language.i18n import _
+from app.loop.characteristics import queries as characteristics
 from app.loop.readings import queries
 from app.loop.readings.importing.cells import MOST_FLAWS, Flaw, Passed
 from app.loop.readings.importing.history import Flawed, Progress, Summary, store_history
@@ -45,6 +46,8 @@ def import_readings(
                 _("There is no characteristic {key}.").format(key=repr(characteristic)),
                 _("Check its key under Set-up, or set it up first."),
             )
+        current = characteristics.characteristic_named(session, characteristic)
+        layout = layout if layout.only else layout.of_one(characteristic, current.characteristic.name)
         parsed_lines = lines(path, layout, characteristic) if read is None else read(0, characteristic)
         if not live:
             summary = store_history(

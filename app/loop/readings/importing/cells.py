@@ -16,9 +16,9 @@ from zoneinfo import ZoneInfo
 from app.files.formats import cell_values, delimited, spreadsheet
 from app.files.formats.cell_values import Unreadable
 from app.files.formats.delimited import Row, Unusable
-from app.files.formats.units import LENGTHS
+from app.files.formats.units import LENGTHS, length_unit
 from app.language.i18n import _
-from app.loop.readings.importing.layout import NO_DIGIT, ORIGIN, Layout, Wishes, look, rows_of
+from app.loop.readings.importing.layout import NO_DIGIT, ORIGIN, Layout, Wishes, look, named_in, rows_of
 from app.loop.readings.origin import Origin
 
 MOST_FLAWS = 200
@@ -162,11 +162,22 @@ def _csv(path: Path, layouts: Sequence[Layout]) -> Iterator[Item]:
                 passed = Passed(row.line, _("is the heading again"))
                 yield from (Item(place, row.line, passed) for place in range(len(layouts)))
                 continue
+            if (stranger := _stranger(row, layouts)) is not None:
+                yield Item(0, row.line, stranger)
+                continue
             for place, own in enumerate(layouts):
-                yield from (Item(place, row.line, found) for found in _of_row(row, own, readers[place]))
+                if not own.only or own.only == named_in(row, own):
+                    yield from (Item(place, row.line, found) for found in _of_row(row, own, readers[place]))
     except Unusable as error:
         line = error.line or 0
         yield from (Item(place, line, Flaw(line, "", "", str(error))) for place in range(len(layouts)))
+
+
+def _stranger(row: Row, layouts: Sequence[Layout]) -> Passed | None:
+    """A row of a characteristic that is not read."""
+    if not layouts[0].only or (name := named_in(row, layouts[0])) in {each.only for each in layouts}:
+        return None
+    return Passed(row.line, _("is of {name}, which is not chosen").format(name=repr(name)))
 
 
 def _of_row(row: Row, layout: Layout, readers: Sequence["_Reader"]) -> Iterator["dict[str, Any] | Flaw | Passed"]:
@@ -189,6 +200,9 @@ def _of_row(row: Row, layout: Layout, readers: Sequence["_Reader"]) -> Iterator[
         except Unreadable as error:
             flawed = True
             yield Flaw(row.line, layout.named(name), shown(text), str(error))
+    if "unit" in values and not flawed:
+        scale = values.pop("unit") or 1.0
+        values["measured"] = values["measured"] if scale == 1.0 else round(values["measured"] * scale, 9)
     if not flawed:
         yield _with_origin(values)
 
@@ -244,10 +258,19 @@ def _readers(layout: Layout) -> list[_Reader]:
         "machined_at": lambda text: time(text) if text else None,
         "correction_in_effect": whole,
         "received_at": lambda text: _or_none(text, zone),
+        "unit": _scale,
         "touches": _touches,
         "context": _context,
     }
-    return [(name, places, kinds.get(name, lambda text: text or None)) for name, places in layout.columns.items()]
+    columns = ((name, places) for name, places in layout.columns.items() if name != "characteristic")
+    return [(name, places, kinds.get(name, lambda text: text or None)) for name, places in columns]
+
+
+def _scale(text: str) -> float | None:
+    """Millimetres in the unit that a row names."""
+    if text and length_unit(text) is None:
+        raise Unreadable(_("is no unit of length that is known ({units})").format(units=", ".join(LENGTHS)))
+    return LENGTHS[length_unit(text) or "mm"] if text else None
 
 
 def _or_none(text: str, zone: ZoneInfo | None) -> datetime | None:

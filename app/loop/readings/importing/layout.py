@@ -38,9 +38,13 @@ NAMES: dict[str, tuple[str, ...]] = {
         "cas izdelave", "обрађено", "време обраде", "обработано", "время обработки",
     ),
     "part": (
-        "part", "part number", "part id", "serial", "serial number", "sn", "teil", "teilenummer", "teile nr", "seriennummer",
+        "part", "part number", "part id", "partnb", "serial", "serial number", "sn", "teil", "teilenummer", "teile nr", "seriennummer",
         "werkstuck", "deo", "komad", "serijski broj", "kos", "obdelovanec", "serijska stevilka",
         "део", "комад", "серијски број", "деталь", "номер детали", "серийный номер",
+    ),
+    "characteristic": (
+        "characteristic", "characteristic name", "feature", "feature name", "merkmal", "merkmalsname", "karakteristika",
+        "znacilnost", "карактеристика", "характеристика",
     ),
     "key": ("key", "schlussel", "kljuc", "ключ", "кључ"),
     "correction_in_effect": ("correction in effect",),
@@ -52,6 +56,10 @@ TOP = 50  # rows in which the header is looked for
 ORIGIN = COLUMNS[:2]
 """Fields that are no choice of a person: they are there in what Inband wrote."""
 NO_DIGIT = "*"
+NOMINALS = {"nominal", "nominal value", "soll", "sollwert", "sollmass", "nominalna vrednost", "номинал"}
+"""Columns that are there where each row is one characteristic; one called id then names it."""
+UNITS = {"unit", "units", "einheit", "jedinica", "enota", "единица"}
+MOST_NAMES = 1_000
 DATES = {"date", "datum", "дата", "датум"}
 TIMES = {"time", "zeit", "uhrzeit", "vreme", "cas", "время", "време"}
 
@@ -91,6 +99,8 @@ class Layout:
     last_line: int | None = None  # below are sums and means
     missing: frozenset[str] = frozenset()
     times: FileTimes = FileTimes()  # noqa: RUF009 - a tuple
+    names: tuple[str, ...] = ()  # of characteristics, where each row says which one it is of
+    only: str = ""  # the one of them that is read
     skips_blank: bool = False  # a row without the measured value says nothing: another column of a wide sheet has one
 
     @property
@@ -102,6 +112,27 @@ class Layout:
     def complete(self) -> bool:
         """Tell if the column of the measured values is known."""
         return "measured" in self.columns or "touches" in self.columns
+
+    @property
+    def subjects(self) -> tuple[str, ...]:
+        """Names that characteristics may be chosen for: those in the rows, else those of the columns."""
+        return self.names or self.header
+
+    def of_one(self, key: str, name: str) -> "Layout":
+        """The layout for one characteristic: of a table with rows of several, its own rows. Raises `Invalid`."""
+        if len(self.names) < 2:
+            return self
+        wanted = {cell_values.folded(key), cell_values.folded(name)}
+        own = [each for each in self.names if cell_values.folded(each) in wanted]
+        if len(own) == 1:
+            return replace(self, only=own[0])
+        raise wrong(
+            self.named("characteristic"),
+            _(
+                "The rows are of {count} characteristics ({names}), and none is called {key}. Say which is which, a "
+                "characteristic for each, in place of the one."
+            ).format(count=len(self.names), names=", ".join(self.names[:10]), key=repr(key)),
+        )
 
     @property
     def ignored_places(self) -> list[int]:
@@ -213,7 +244,7 @@ def _csv_layout(path: Path, wishes: Wishes, zone: ZoneInfo | None, kind: str = "
     only = slice(place, place + 1) if "measured" in columns else slice(None)
     below = [row for row in chain(top, islice(rows, 200)) if row.line >= first_line]
     sample = [cell for row in below for cell in row.cells[only]]
-    layout = Layout(
+    made = Layout(
         kind=kind,
         header=header,
         columns=columns,
@@ -228,7 +259,7 @@ def _csv_layout(path: Path, wishes: Wishes, zone: ZoneInfo | None, kind: str = "
         last_line=wishes.last_line,
         missing=wishes.missing,
     )
-    return replace(layout, times=_times(layout, below, rows))
+    return replace(made, times=_times(made, below, rows), names=_names_in(path, made))
 
 
 def _times(layout: Layout, begin: Sequence[Row], rest: Iterator[Row]) -> FileTimes:
@@ -249,6 +280,26 @@ def _times(layout: Layout, begin: Sequence[Row], rest: Iterator[Row]) -> FileTim
 def text_of(row: Row, places: Sequence[int]) -> str:
     """The cells at these places as one text; a row may be shorter than the header."""
     return " ".join(row.cells[place] for place in places if place < len(row.cells)).strip()
+
+
+def _names_in(path: Path, layout: Layout) -> tuple[str, ...]:
+    """The characteristics that the rows name, in their order."""
+    if "characteristic" not in layout.columns:
+        return ()
+    names: dict[str, None] = {}
+    for row in rows_of(path, layout):
+        if isinstance(row, Row) and (name := named_in(row, layout)) and tuple(row.cells) != layout.header:
+            names[name] = None
+            if len(names) > MOST_NAMES:
+                column = layout.named("characteristic")
+                words = _("The column names more than {most} characteristics; part the file.")
+                raise wrong(column, words.format(most=MOST_NAMES))
+    return tuple(names)
+
+
+def named_in(row: Row, layout: Layout) -> str:
+    """The characteristic that a row names."""
+    return " ".join(row.cells[place] for place in layout.columns["characteristic"]).strip()
 
 
 def rows_of(path: Path, layout: Layout) -> Iterator[Row | Unusable]:
@@ -324,6 +375,8 @@ def _json_layout(path: Path, wishes: Wishes, zone: ZoneInfo | None, *, is_list: 
     if not header:
         raise wrong("file", _("The file holds no JSON objects."))
     columns = _columns(header, wishes.mapping)
+    columns.pop("characteristic", None)  # objects of several are sent to the API
+    columns.pop("unit", None)
     unit = unit_of(header[columns["measured"][0]] if "measured" in columns else "", wishes.unit)
     layout = Layout(
         "list" if is_list else "lines", header, columns, unit=unit, zone=zone, time_format=wishes.time_format
@@ -411,6 +464,10 @@ def _guesses(header: tuple[str, ...]) -> dict[str, tuple[int, ...]]:
     time = next((place for place, each in enumerate(names) if each in TIMES), None)
     if date is not None and time is not None:
         guesses["measured_at"] = (date, time)
+    if "characteristic" not in guesses and "measured" in guesses and "id" in names and NOMINALS & set(names):
+        guesses["characteristic"] = (names.index("id"),)
+    if "characteristic" in guesses and (unit := next((at for at, name in enumerate(names) if name in UNITS), None)):
+        guesses["unit"] = (unit,)
     if set(COLUMNS) <= set(header):
         guesses |= {name: (header.index(name),) for name in ORIGIN}
     return guesses

@@ -154,7 +154,8 @@ def _preview(
     trouble: InbandError | None = None
     try:
         looked = look_apart(upload.path, _wishes(said), upload.name)
-        layout = looked.layout
+        layout = looked.layout.of_one(characteristic, current.characteristic.name)
+        looked = looked._replace(layout=layout)
         preview_result = preview(_database(request), characteristic, upload.path, looked)
         trouble = preview_result.trouble
     except InbandError as error:
@@ -188,6 +189,8 @@ def _wide_preview(request: Request, upload: Upload, said: Mapping[str, str], *, 
     try:
         looked = look_apart(upload.path, _wishes(said), upload.name)
         layout = looked.layout
+        if layout.names:
+            refuse_incomplete(layout)
         if any(name.startswith("to_") for name in said):
             chosen = {column.place: column.characteristic for column in wide.columns_of(said, layout)}
         else:
@@ -268,12 +271,13 @@ def _fields(layout: Layout, *, wide: bool = False) -> list[dict[str, Any]]:
         "measured_at": _("Time of measuring"),
         "machined_at": _("Time of cutting"),
         "part": _("Part"),
+        "characteristic": _("Characteristic"),
         "key": _("Key"),
     }
     columns = [(str(at), name or _("Column {n}").format(n=at)) for at, name in enumerate(layout.header, start=1)]
     fields: list[dict[str, Any]] = []
     for name, label in labels.items():
-        if wide and name in {"measured", "key"}:
+        if wide and name in {"measured", "key"} and not layout.names:
             continue
         places = layout.columns.get(name, ())
         value = "+".join(str(place + 1) for place in places)
@@ -304,6 +308,9 @@ def import_it(
         if not characteristic:
             return _import_wide(request, caller, upload, layout, form)
         refuse_incomplete(layout)
+        with _database(request).sessions() as own:
+            current = characteristics.characteristic_named(own, characteristic)
+        layout = layout.of_one(characteristic, current.characteristic.name)
         with read_apart(upload.path, [layout]) as read:
             summary = import_readings(
                 _database(request),

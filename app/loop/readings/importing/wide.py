@@ -50,15 +50,17 @@ def columns_by_name(layout: Layout, known: Sequence[CurrentCharacteristic]) -> d
             names.setdefault(cell_values.folded(name), []).append(current.characteristic.key)
     found: dict[int, str] = {}
     taken = {place for field, places in layout.columns.items() if field != "measured" for place in places}
-    for place, name in enumerate(layout.header):
+    for place, name in enumerate(layout.subjects):
         keys = names.get(cell_values.folded(name), [])
-        if place not in taken and len(keys) == 1 and keys[0] not in found.values():
+        if (layout.names or place not in taken) and len(keys) == 1 and keys[0] not in found.values():
             found[place] = keys[0]
     return found
 
 
 def layout_of(layout: Layout, column: Column, unit: str | None) -> Layout:
     """The layout by which one column is read; without a unit that somebody said, that of its header counts, else mm."""
+    if layout.names:
+        return replace(layout, only=layout.names[column.place])
     fields = {
         name: places for name, places in layout.columns.items() if name not in {"measured", "touches", "key", *ORIGIN}
     }
@@ -177,9 +179,9 @@ def columns_said(text: str, layout: Layout) -> list[Column]:
     found = []
     for pair in filter(None, (part.strip() for part in text.split(","))):
         name, _sign, key = (part.strip() for part in pair.rpartition("="))
-        place = layout.header.index(name) if name in layout.header else int(name) - 1 if name.isdecimal() else -1
-        if not key or not 0 <= place < len(layout.header):
-            there = ", ".join(layout.header)
+        place = layout.subjects.index(name) if name in layout.subjects else int(name) - 1 if name.isdecimal() else -1
+        if not key or not 0 <= place < len(layout.subjects):
+            there = ", ".join(layout.subjects)
             raise Invalid.at(
                 "columns", _("{pair} names no column; the file has: {header}").format(pair=repr(pair), header=there)
             )
@@ -187,7 +189,14 @@ def columns_said(text: str, layout: Layout) -> list[Column]:
     return found
 
 
+def columns_known(database: Database, layout: Layout) -> list[Column]:
+    """The names in the rows that are keys or names of characteristics here."""
+    with database.sessions() as session:
+        known = characteristics.characteristics(session, limit=100_000)
+        return [Column(place, key) for place, key in columns_by_name(layout, known).items()]
+
+
 def columns_of(form: Mapping[str, str], layout: Layout) -> list[Column]:
     """Columns as chosen in a form: `to_3` is the key of the characteristic of the third column."""
-    chosen = ((place, form.get(f"to_{place + 1}", "").strip()) for place in range(len(layout.header)))
+    chosen = ((place, form.get(f"to_{place + 1}", "").strip()) for place in range(len(layout.subjects)))
     return [Column(place, key) for place, key in chosen if key]
