@@ -59,7 +59,11 @@ def goodness(fit: Fit) -> str:
 
 def reason(found: Fitted) -> str:
     """The reason why this distribution was taken."""
-    if why(found) is Choice.ALONE:
+    if len(found.tried) == 1:
+        sentence = _(
+            "The one that is tried without a natural limit; the readings do not contradict it (Anderson-Darling, p at least {level})."
+        )
+    elif why(found) is Choice.ALONE:
         sentence = _("The only one of {n} that the readings do not contradict (Anderson-Darling, p at least {level}).")
     else:
         sentence = _(
