@@ -7,13 +7,16 @@ from collections.abc import Sequence
 from markupsafe import Markup, escape
 
 from app.core.decision.limits import HasLimits, Limits, classify, within_tolerance
+from app.core.natural import half_of, natural_of, tolerance_about_target
 from app.language.i18n import _
 from app.language.numbers import um
-from app.views.characteristic.figures.scale import ZoneScale, bands
+from app.views.characteristic.figures.labels import judged_sides
+from app.views.characteristic.figures.scale import ZoneScale, bands, ends_of
 from app.web.states import tone_of
 from app.web.theme import ZONE_OUTLINES, zone_name
 
 WIDTH, HEIGHT = 240.0, 44.0
+BEYOND = 0.15  # of the height of a trend, beyond a natural limit
 TOP, BOTTOM = 7.0, 37.0  # of the bands; the reading's mark and the average reach a little beyond them
 
 
@@ -34,23 +37,31 @@ def band_picture(
     zone: as it was decided; worked out from the deviation if not given.
     """
     scale = ZoneScale.of(limits)
+    low, high = ends_of(scale)
 
     def x(position: float) -> float:
-        return WIDTH / 2 + position / scale.extent * (WIDTH / 2 - 1)
+        return 1 + (position - low) / (high - low) * (WIDTH - 2)
+
+    def outward(place: int, sign: int) -> float:
+        """An edge that many bands from the target; beyond a natural limit there is the zero band, and one of what cannot be."""
+        if sign == scale.natural.side and place < len(scale.edges):
+            return sign * min(place, scale.beyond - 1)
+        return max(low, min(high, float(sign * place)))
 
     parts = []
     for place, band in reversed(list(enumerate(bands(limits)))):
-        outer = x(place + 1)
+        left, right = x(outward(place + 1, -1)), x(outward(place + 1, 1))
         parts.append(
-            f'<rect class="band-{band.number}" x="{WIDTH - outer:.2f}" y="{TOP:g}" width="{2 * outer - WIDTH:.2f}" height="{BOTTOM - TOP:g}"/>'
+            f'<rect class="band-{band.number}" x="{left:.2f}" y="{TOP:g}" width="{right - left:.2f}" height="{BOTTOM - TOP:g}"/>'
         )
     for place, band in enumerate(bands(limits)):
         if band.limits:
-            kind = "tolerance" if "R35/2" in band.limits else "limit"
-            parts += [f'<path class="{kind}" d="M{at:.2f} {TOP:g}V{BOTTOM:g}"/>' for at in (x(place), WIDTH - x(place))]
+            kind = "tolerance" if band.begins_outside else "limit"
+            ends = [x(sign * place) for sign in judged_sides(scale.natural)]
+            parts += [f'<path class="{kind}" d="M{at:.2f} {TOP:g}V{BOTTOM:g}"/>' for at in ends]
     parts.extend(
         (
-            f'<path class="target" d="M{WIDTH / 2:g} {TOP:g}V{BOTTOM:g}"/>',
+            f'<path class="{"tolerance" if scale.natural.side else "target"}" d="M{x(0):g} {TOP:g}V{BOTTOM:g}"/>',
             f'<rect class="frame" x="0.5" y="{TOP:g}" width="{WIDTH - 1:g}" height="{BOTTOM - TOP:g}"/>',
         )
     )
@@ -78,17 +89,21 @@ def sparkline(deviations: Sequence[float], limits: HasLimits) -> Markup:
     """
     width, height = 200.0, 44.0
     borders = Limits.of(limits)
-    tolerance = max(limits.tolerance_width / 2, 1e-6)
+    tolerance, natural = max(half_of(limits), 1e-6), natural_of(limits)
     reach = max(1.0, min(2.0, max((abs(d) for d in deviations), default=0.0) / tolerance)) * tolerance * 1.08
 
-    def y(deviation: float) -> float:
-        return height / 2 - max(-1.0, min(1.0, deviation / reach)) * (height / 2 - 3)
+    low = -BEYOND if natural.side < 0 else -1.0
+    high = BEYOND if natural.side > 0 else 1.0
 
+    def y(deviation: float) -> float:
+        return 3 + (high - max(low, min(high, deviation / reach))) / (high - low) * (height - 6)
+
+    limits_judged = reversed(tolerance_about_target(tolerance, natural).judged)
     step = (width - 8) / max(len(deviations) - 1, 1)
     points = [(4 + i * step, y(d)) for i, d in enumerate(deviations)]
     parts = [
-        f'<path class="target" d="M0 {height / 2:g}H{width:g}"/>',
-        f'<path class="edge" d="M0 {y(tolerance):.2f}H{width:g}M0 {y(-tolerance):.2f}H{width:g}"/>',
+        f'<path class="target" d="M0 {y(0):g}H{width:g}"/>',
+        f'<path class="edge" d="{"".join(f"M0 {y(limit):.2f}H{width:g}" for limit in limits_judged)}"/>',
     ]
     if points:
         parts.append(f'<polyline class="line" points="{" ".join(f"{px:.1f},{py:.1f}" for px, py in points)}"/>')

@@ -11,10 +11,11 @@ from numpy.typing import NDArray
 
 from app.charts import Axis, Bars, Chart, Dots, Note, Panel, Pen, Room, Rule, Series, empty, time_axis
 from app.core.decision.limits import HasLimits, Limits, in_nanometres
+from app.core.natural import NaturalLimit, half_of, natural_of, tolerance_about_target
 from app.language.i18n import _
 from app.language.numbers import um
 from app.views.characteristic.figures.labels import LIMIT, TARGET, TOLERANCE
-from app.views.characteristic.figures.scale import TrueScale
+from app.views.characteristic.figures.scale import TrueScale, ends_of
 from app.views.characteristic.figures.sizes import SizeAxis, size_lines
 from app.web.theme import ZONE_SYMBOLS, zone_name, zone_role
 
@@ -23,6 +24,7 @@ Floats = NDArray[np.float64]
 BARS_PER_SIDE = 15  # whole bars between target and tolerance limit, so that the limits fall between bars
 REACH = 1.4  # the histogram ends at so many times the tolerance; what lies further out is in the two end bars
 WHOLE_BARS = round(BARS_PER_SIDE * REACH)  # on each side of the target
+BEYOND_NATURAL = 3  # bars beyond a natural limit, where nothing but the scatter of measuring is
 FEW = 4  # readings in the longest bar up to which they are counted by ones: there are no half readings
 
 
@@ -40,10 +42,18 @@ class RunPoint:
     measured: float | None = None
 
 
+def _numbers(limits: HasLimits) -> range:
+    """The edges between the bars, counted from the target in bars."""
+    natural = natural_of(limits)
+    first = BEYOND_NATURAL if natural is NaturalLimit.LOWER else WHOLE_BARS
+    last = BEYOND_NATURAL if natural is NaturalLimit.UPPER else WHOLE_BARS
+    return range(-first, last + 1)
+
+
 def histogram_edges(limits: HasLimits) -> list[float]:
     """The edges (mm) between the bars, ascending; bars 0 and n are open to the outside (as width_bucket counts them)."""
     half = max(Limits.of(limits).tolerance, 1)
-    return [half * i / BARS_PER_SIDE / 1e6 for i in range(-WHOLE_BARS, WHOLE_BARS + 1)]
+    return [half * i / BARS_PER_SIDE / 1e6 for i in _numbers(limits)]
 
 
 def counting_edges(limits: HasLimits) -> list[float]:
@@ -51,9 +61,7 @@ def counting_edges(limits: HasLimits) -> list[float]:
     tolerance limit itself it is good, so it counts inside.
     """
     half = max(Limits.of(limits).tolerance, 1)
-    edges = [half * i / BARS_PER_SIDE for i in range(-WHOLE_BARS, WHOLE_BARS + 1)]
-    edges[WHOLE_BARS + BARS_PER_SIDE] += 0.5
-    return edges
+    return [half * i / BARS_PER_SIDE + (0.5 if i == BARS_PER_SIDE else 0.0) for i in _numbers(limits)]
 
 
 def histogram_centres(limits: HasLimits) -> list[float]:
@@ -75,14 +83,15 @@ def histogram_figure(counts: Sequence[int], limits: HasLimits) -> Chart:
     edges = [edge * 1000 for edge in histogram_edges(limits)]
     width = edges[1] - edges[0]
     centres = histogram_centres(limits)
-    half = limits.tolerance_width * 500
+    half, natural = half_of(limits) * 1000, natural_of(limits)
+    judged = tolerance_about_target(half, natural).judged
     total = sum(counts)
     names = [_("{low} to {high} µm").format(low=f"{c - width / 2:+.1f}", high=f"{c + width / 2:+.1f}") for c in centres]
     names[0], names[-1] = (
         _("below {low} µm").format(low=f"{edges[0]:+.1f}"),
         _("above {high} µm").format(high=f"{edges[-1]:+.1f}"),
     )
-    extent = edges[-1] + width
+    reach = (edges[0] - width, edges[-1] + width)
     bars = Bars(
         counts,
         centres,
@@ -102,16 +111,16 @@ def histogram_figure(counts: Sequence[int], limits: HasLimits) -> Chart:
             (half, TOLERANCE),
             (limits.averaging_limit * 1000, LIMIT),
             (limits.zero_range * 1000, LIMIT),
-            (0.0, TARGET),
+            (0.0, TOLERANCE if natural.side else TARGET),
         )
         for sign in ((1, -1) if limit else (1,))
-        if limit <= extent
+        if reach[0] <= sign * limit <= reach[1] and sign * (limit or 1) * natural.side <= 0
     ]
     deviation = Axis(
         _("Deviation, µm"),
-        reach=(-extent, extent),
-        at=[-half, 0, half],
-        words=[um(-half / 1000).replace("\xa0µm", ""), "0", um(half / 1000).replace("\xa0µm", "")],
+        reach=reach,
+        at=sorted([0.0, *judged]),
+        words=[um(at / 1000).replace("\xa0µm", "") if at else "0" for at in sorted([0.0, *judged])],
         grid=False,
         fixed=True,
     )
@@ -127,9 +136,10 @@ def run_figure(points: Sequence[RunPoint], limits: HasLimits, *, sizes: SizeAxis
 
     What lies far outside the tolerance stands at the edge with its deviation: one probe fault would press all else into a line.
     """
-    half, target = limits.tolerance_width / 2, sizes.target
+    target, natural = sizes.target, natural_of(limits)
+    judged = tolerance_about_target(half_of(limits), natural).judged
     scale = TrueScale.of(limits, [point.deviation for point in points])
-    reach = scale.extent / 1000
+    low, high = (end / 1000 for end in ends_of(scale))
     course = Series(
         [point.at for point in points],
         [round(target + scale.position(point.deviation) / 1000, 9) for point in points],
@@ -154,10 +164,13 @@ def run_figure(points: Sequence[RunPoint], limits: HasLimits, *, sizes: SizeAxis
     )
     lines = [
         Rule(pen, y, words=f"{y:.4f}")
-        for y, pen in ((target + half, TOLERANCE), (target, TARGET), (target - half, TOLERANCE))
+        for y, pen in (
+            *((target + limit, TOLERANCE) for limit in reversed(judged)),
+            (target, TOLERANCE if natural.side else TARGET),
+        )
     ]
     said = _at_the_edge(points, scale, target) if points else [empty(_("No readings yet"))]
-    height = Axis(sizes.title, format=".4f", ticks=6, reach=(target - 1.08 * reach, target + 1.08 * reach))
+    height = Axis(sizes.title, format=".4f", ticks=6, reach=(target + 1.08 * low, target + 1.08 * high))
     return Chart([Panel([*lines, course, *said], height)], time_axis(), Room(left=92, right=110))
 
 

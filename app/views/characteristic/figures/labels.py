@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from app.charts import BANDS, Ground, Note, Pen, Role, Rule, Share
 from app.core.decision.limits import HasLimits
+from app.core.natural import NaturalLimit, half_of, tolerance_about_target
 from app.language.i18n import _
 from app.language.numbers import MINUS, NO_BREAK_SPACE, NOTHING, um_limit
-from app.views.characteristic.figures.scale import Band, Scale, ZoneScale, bands
+from app.views.characteristic.figures.scale import Band, Scale, ZoneScale, bands, ends_of
 
 # In the linear scale close limits would write over each other: the least distance as a share of the whole height.
 LEAST_DISTANCE = 0.046
@@ -18,16 +19,23 @@ def limit_title(limit: str, limits: HasLimits) -> str:
     """The name of a limit in the manual; of R34 its true share of the half tolerance, which the manual puts at ⅔."""
     return {
         "R33": _("zero compensation"),
-        "R34": _("{share} of the half tolerance").format(share=_share(limits)),
+        "R34": _share_title(limits),
         "R35/2": _("tolerance"),
+        "R35": _("tolerance"),
         "R37": _("dimensional difference"),
         "R36": _("safe area"),
     }[limit]
 
 
+def _share_title(limits: HasLimits) -> str:
+    whole = half_of(limits) == limits.tolerance_width
+    text = _("{share} of the tolerance") if whole else _("{share} of the half tolerance")
+    return text.format(share=_share(limits))
+
+
 def _share(limits: HasLimits) -> str:
-    """R34 as a share of R35/2."""
-    half = limits.tolerance_width / 2
+    """R34 as a share of R35/2, or of R35 from a natural limit."""
+    half = half_of(limits)
     if half <= 0:
         return NOTHING
     share = limits.averaging_limit / half
@@ -49,8 +57,11 @@ def band_text(band: Band, sign: int) -> str:
 
 
 def band_grounds(limits: HasLimits, ruler: Scale) -> list[Ground]:
-    """Backgrounds of the bands: grey inside the tolerance, a light colour outside."""
-    return [
+    """Backgrounds of the bands: grey inside the tolerance, a light colour outside, and where nothing can be."""
+    edge = ruler.position(ruler.natural.side * limits.zero_range)
+    end = ruler.natural.side * ruler.beyond
+    cannot_be = [Ground(BANDS[0], (0.0, edge)), Ground(BANDS[5], (edge, end))] if ruler.natural.side else []
+    return cannot_be + [
         Ground(
             BANDS[band.number],
             (
@@ -59,19 +70,23 @@ def band_grounds(limits: HasLimits, ruler: Scale) -> list[Ground]:
             ),
         )
         for band in bands(limits)
-        for sign in (1, -1)
+        for sign in judged_sides(ruler.natural)
         if _edge(band.lower, ruler) < ruler.extent
     ]
 
 
 def limit_lines(limits: HasLimits, ruler: Scale) -> list[Rule]:
     """The limits, the tolerance the strongest, and the target, dashed."""
-    lines = [Rule(TARGET, 0)]
+    lines = [Rule(TOLERANCE if ruler.natural.side else TARGET, 0)]
+    if ruler.natural.side and limits.zero_range:
+        lines.append(Rule(LIMIT, ruler.position(ruler.natural.side * limits.zero_range)))
     for band in bands(limits):
         if not band.limits or not band.lower or not ruler.fits(band.lower):
             continue  # a limit of 0 is the target
         edge = _edge(band.lower, ruler)
-        lines += [Rule(TOLERANCE if "R35/2" in band.limits else LIMIT, y) for y in (edge, -edge)]
+        lines += [
+            Rule(TOLERANCE if band.begins_outside else LIMIT, sign * edge) for sign in judged_sides(ruler.natural)
+        ]
     return lines
 
 
@@ -81,18 +96,24 @@ def limit_labels(limits: HasLimits, ruler: Scale, size: int, *, brief: bool = Fa
     brief: names and values of the limits only.
     """
     all_bands = bands(limits)
-    height = 2 * ruler.extent
+    low, high = ends_of(ruler)
+    height = high - low
     middle = [] if isinstance(ruler, ZoneScale) else [_("target")]
+    if ruler.natural.side:
+        middle = [_("natural limit")]
     if all_bands[0].limits:  # R33 = 0 lies on the target: one label for both sides
         middle.append(f"{' = '.join(all_bands[0].limits)}  0{NO_BREAK_SPACE}µm")
     title = f"  {limit_title(all_bands[0].limits[-1], limits)}" if all_bands[0].limits and not brief else ""
     notes: list[Note] = [_note(0, f"<b>{' = '.join(middle)}</b>{title}" if middle else "", "quiet", size)]
-    for sign in (1, -1):
+    if ruler.natural.side and not brief:
+        strip = (ruler.position(ruler.natural.side * limits.zero_range) + ruler.natural.side * ruler.beyond) / 2
+        notes.append(_note(strip, _("cannot be: alarm “probe fault”"), "quiet", size))
+    for sign in judged_sides(ruler.natural):
         written = 0.0 if not isinstance(ruler, ZoneScale) else -height
         for band in all_bands:
             lower = _edge(band.lower, ruler)
             if band.limits and band.lower and ruler.fits(band.lower):
-                strong = "R35/2" in band.limits
+                strong = band.begins_outside
                 place = max(lower, written + LEAST_DISTANCE * height)
                 written = place
                 names = " = ".join(band.limits)
@@ -110,8 +131,9 @@ def limit_labels(limits: HasLimits, ruler: Scale, size: int, *, brief: bool = Fa
             if isinstance(ruler, ZoneScale):
                 if band.number > 0:
                     notes.append(_note(sign * (lower + upper) / 2, band_text(band, sign), "quiet", size))
-                elif sign > 0:
-                    notes.append(_note(0, band_text(band, sign), "quiet", size))
+                elif sign > 0 or ruler.natural.side:
+                    middle_of = sign * (lower + upper) / 2 if ruler.natural.side else 0
+                    notes.append(_note(middle_of, band_text(band, sign), "quiet", size))
             elif room > 1.6 * LEAST_DISTANCE and band.number > 0:
                 place = max((max(lower, written) + upper) / 2, written + LEAST_DISTANCE * height)
                 written = place
@@ -131,17 +153,24 @@ def size_ticks(limits: HasLimits, ruler: Scale, centre: float | None) -> tuple[l
     """Places and words of the left axis: the sizes (mm) at target and limits, or the deviations if the centre is not known."""
     ticks: list[float] = []
     words: list[str] = []
-    least = LEAST_DISTANCE * 2 * ruler.extent
+    low, high = ends_of(ruler)
+    least = LEAST_DISTANCE * (high - low)
+    sides = judged_sides(ruler.natural)
     for band in bands(limits):
         place = _edge(band.lower, ruler)
-        if not ruler.fits(band.lower) or (band.limits and ticks and place - max(ticks) < least):
+        if not ruler.fits(band.lower) or (band.limits and ticks and place - max(map(abs, ticks)) < least):
             continue
-        for sign in (1, -1) if band.lower else (1,):
+        for sign in sides if band.lower else sides[:1]:
             deviation = sign * band.lower
             ticks.append(sign * place)
             text = _signed_limit(deviation) if centre is None else f"{centre + deviation:.4f}"
-            words.append(f"<b>{text}</b>" if not band.lower or "R35/2" in band.limits else text)
+            words.append(f"<b>{text}</b>" if not band.lower or band.begins_outside else text)
     return ticks, words
+
+
+def judged_sides(natural: NaturalLimit) -> tuple[int, ...]:
+    """Signs of the limits that are judged, the upper one first."""
+    return tuple(1 if limit > 0 else -1 for limit in reversed(tolerance_about_target(1.0, natural).judged))
 
 
 def _edge(deviation: float, ruler: Scale) -> float:

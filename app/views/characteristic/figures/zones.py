@@ -25,7 +25,7 @@ from app.views.characteristic.figures.blocks import Block, envelope
 from app.views.characteristic.figures.by_hand import HandPoint, hand_marks
 from app.views.characteristic.figures.labels import band_grounds, limit_labels, limit_lines, size_ticks
 from app.views.characteristic.figures.lanes import Step, offset_lane
-from app.views.characteristic.figures.scale import Scale, ScaleName, TrueScale, ZoneScale
+from app.views.characteristic.figures.scale import Scale, ScaleName, TrueScale, ZoneScale, ends_of
 from app.views.characteristic.figures.sizes import SizeAxis, size_lines
 from app.web.theme import ZONE_SYMBOLS, zone_name, zone_role
 
@@ -138,7 +138,7 @@ def _size_axis(limits: HasLimits, ruler: Scale, sizes: SizeAxis | None, letters:
     title = _("Deviation") if sizes is None else sizes.title
     return Axis(
         "" if brief else title,
-        reach=(-ruler.extent, ruler.extent),
+        reach=ends_of(ruler),
         at=ticks,
         words=words,
         grid=False,
