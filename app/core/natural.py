@@ -111,7 +111,7 @@ _FORM = re.compile(
         | parallelism | parallelit[aä]t | perpendicularity | squareness | rechtwinkligkeit | angularity | neigung
         | concentricity | konzentrizit[aä]t | coaxiality | koaxialit[aä]t | symmetry | symmetrie
         | (line|surface)\s*profile | profilform | true\s*position | position\s*tolerance
-        | roughness | rauheit | rautiefe | waviness | welligkeit | taper | konizit[aä]t
+        | roughness | rauheit | rautiefe | waviness | welligkeit
         | r[aztq](?=$|[\s\d_-])
     )(?![a-z])""",
     re.IGNORECASE | re.VERBOSE,

@@ -21,6 +21,7 @@ from app.core.natural import (
     assumed,
     half_of,
     half_width,
+    looks_natural,
     target_of,
     tolerance_about_target,
 )
@@ -411,11 +412,16 @@ def _natural(values: Mapping[str, Any]) -> Iterator[Problem]:
         yield Problem("mode", "natural_corrected", {})
 
 
-def unusual_natural(given: Mapping[str, Any], parameters: Parameters) -> list[Problem]:
-    """Warn of a natural limit that was not said but assumed. given: what was sent, by name or R number."""
+def unusual_natural(given: Mapping[str, Any], parameters: Parameters, name: str) -> list[Problem]:
+    """Warn of a natural limit that was not said but assumed, and propose one that the name says.
+
+    given: what was sent, by name or R number. name: of the characteristic.
+    """
+    if parameters.natural_limit is NaturalLimit.NONE:
+        return [Problem("natural_limit", "natural_likely", {"name": name}, warning=True)] if looks_natural(name) else []
     said = any(raw == "natural_limit" and value is not None for raw, value in given.items())
     sizes = {"R42", "R40", "R41", "NOMINAL", "UPPER_DEVIATION", "LOWER_DEVIATION"} & {raw.upper() for raw in given}
-    if said or not sizes or parameters.natural_limit is NaturalLimit.NONE:
+    if said or not sizes:
         return []
     return [Problem("natural_limit", "natural_assumed", {"limit": parameters.target}, warning=True)]
 

@@ -147,7 +147,6 @@ def test_names_of_form() -> None:
         "Ra",
         "Rz16",
         "Flatness top",
-        "Taper",
     ):
         assert looks_natural(name), name
     for name in ("Diameter 40", "Radius", "Length", "Position X", "Bore around pin"):

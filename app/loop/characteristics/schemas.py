@@ -156,7 +156,7 @@ def warnings_of(
         unusual = []
     unusual += unusual_on(parameters.as_dict(), MachineType(machine.type))
     unusual += unusual_switch(given or {})
-    unusual += unusual_natural(given or {}, parameters)
+    unusual += unusual_natural(given or {}, parameters, current.characteristic.name)
     if nanometres(parameters.zero_range) < nanometres(machine.zero_range_floor):
         values = {"value": parameters.zero_range, "floor": machine.zero_range_floor}
         unusual.append(Problem("zero_range", "signal_path", values, warning=True))

@@ -272,8 +272,13 @@ def sentence(problem: Problem) -> str:
 
 
 def _natural(problem: Problem) -> str:
-    if problem.code not in {"natural_corrected", "natural_assumed"}:
+    if problem.code not in {"natural_corrected", "natural_assumed", "natural_likely"}:
         return problem.code
+    if problem.code == "natural_likely":
+        return _(
+            "The name {name} is that of a form, position or roughness deviation, of which nothing is below 0. If so, set "
+            "natural_limit to lower: then only the upper limit is judged, and the target is the lower one"
+        ).format(name=problem.data["name"])
     if problem.code == "natural_corrected":
         return _(
             "A size with a natural limit (roundness, run-out) has no sign, so no offset corrects it: set R10 to 0 or the mode to "

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from typing import Any, NamedTuple
 
 from app.core.fits import fit_of
-from app.core.natural import assumed, half_width
+from app.core.natural import NaturalLimit, assumed, half_width
 from app.core.number_text import number_or_none, plain
 from app.core.parameters import BY_NAME, FIELDS, Field, FieldKind, default_averaging_limit, mean_nominal
 from app.core.programs.lines import written
@@ -171,6 +171,8 @@ class Diagram(NamedTuple):
     target: float | None
     width: float | None
     limits: dict[str, float | None]
+    natural: int = 0
+    """Side of the natural limit, which has no limits: -1 below, 1 above."""
 
 
 def diagram(typed: Mapping[str, str]) -> Diagram:
@@ -178,7 +180,8 @@ def diagram(typed: Mapping[str, str]) -> Diagram:
     fit = fit_of(typed.get("nominal", ""))
     values = {name: _length(typed.get(name, "")) for name in BY_NAME} | (fit._asdict() if fit else {})
     target, width = values["target"], values["tolerance_width"]
-    natural = typed.get("natural_limit") or assumed(values | {"mode": typed.get("mode")})
+    said = typed.get("natural_limit")
+    natural = NaturalLimit(said) if said in set(NaturalLimit) else assumed(values | {"mode": typed.get("mode")})
     drawing = [values[name] for name in DRAWING]
     if all(value is not None for value in drawing):
         nominal, upper, lower = (value or 0.0 for value in drawing)
@@ -196,6 +199,7 @@ def diagram(typed: Mapping[str, str]) -> Diagram:
             "wear_limit": values["wear_limit"],
             "confidence_limit": values["confidence_limit"],
         },
+        natural.side,
     )
 
 

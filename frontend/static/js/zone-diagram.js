@@ -75,20 +75,31 @@ customElements.define("zone-diagram", class extends HTMLElement {
       target = values.nominal + (values.upper_deviation + values.lower_deviation) / 2;
       width = values.upper_deviation - values.lower_deviation;
     }
+    const natural = this.natural(values); // -1, 0 or 1: the side that does not exist; the target is its limit
+    if (natural && drawing.every(usable)) target += (natural * width) / 2;
+    const half = natural ? width : width / 2;
     const limits = {
       ...values,
-      tolerance: usable(width) ? width / 2 : null,
-      averaging_limit: values.averaging_limit ?? (usable(width) ? width / 3 : null),
+      tolerance: usable(width) ? half : null,
+      averaging_limit: values.averaging_limit ?? (usable(width) ? (half * 2) / 3 : null),
     };
-    this.form.elements.averaging_limit.placeholder = usable(width) && width > 0 ? plain(width / 3) : "";
-    this.write(target, width, limits);
+    this.form.elements.averaging_limit.placeholder = usable(width) && width > 0 ? plain((half * 2) / 3) : "";
+    this.write(target, width, limits, natural);
     this.explain(values, limits);
   }
 
-  write(target, width, limits) {
+  /** The side of the natural limit; where none is chosen as the server has it: 0 at best, no minus, nothing corrected. */
+  natural(values) {
+    const { natural_limit: chosen, tool_memory: tool, mode } = this.form.elements;
+    if (chosen?.value) return { lower: -1, upper: 1 }[chosen.value] ?? 0;
+    const measures = !typed(tool?.value ?? "") || mode?.value === "measure_only";
+    return chosen && measures && values.nominal === 0 && values.lower_deviation === 0 && values.upper_deviation > 0 ? -1 : 0;
+  }
+
+  write(target, width, limits, natural) {
     for (const group of this.querySelectorAll("[data-limit]")) {
-      const limit = limits[group.dataset.limit];
       const side = Number(group.dataset.side);
+      const limit = side === natural ? null : limits[group.dataset.limit];
       group.querySelector(".deviation").textContent = usable(limit) ? `${side > 0 ? "+" : MINUS}${deviation(limit)}` : "–";
       group.querySelector(".size").textContent = usable(limit) && usable(target) ? size(target + side * limit) : "";
     }

@@ -93,7 +93,8 @@ def test_a_limit_that_was_taken_for_natural_is_named_and_can_be_refused(shop: Sh
     assert [each["code"] for each in added["warnings"]] == ["natural_assumed"]
     key = added["key"]
     changed = shop.call("PATCH", f"/characteristics/{key}", parameters={"natural_limit": "none"}, reason="a position")
-    assert (changed["parameters"]["target"], changed["warnings"]) == (0.005, [])
+    assert changed["parameters"]["target"] == 0.005
+    assert [each["code"] for each in changed["warnings"]] == ["natural_likely"]  # by its name
     refused = shop.call(
         "PATCH", f"/characteristics/{key}", 422, reason="correct it",
         parameters={"natural_limit": "lower", "R10": 3, "factor": -1},
@@ -108,3 +109,11 @@ def test_what_no_part_can_be_is_a_probe_fault(shop: Shop) -> None:
     assert "beyond the natural limit" in answer["reason"]["text"]
     alarm = next(each for each in shop.alarms() if each["characteristic"] == key)
     assert "natural limit" in alarm["text"]
+
+
+def test_set_up_offers_it_and_draws_one_side(shop: Shop, engineer: Person, run_out: str) -> None:
+    page = engineer.open(f"/setup/characteristics/{run_out}")
+    assert '<option value="lower" selected' in page
+    assert page.count('data-limit="tolerance"') == 2
+    assert "+12.7" in page
+    assert "−12.7" not in page
