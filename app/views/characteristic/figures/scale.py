@@ -69,8 +69,9 @@ def bands(limits: HasLimits) -> tuple[Band, ...]:
 class Scale(Protocol):
     """Scale of the deviations on the chart."""
 
-    natural: NaturalLimit
-    """On the side of a natural limit nothing is judged."""
+    @property
+    def natural(self) -> NaturalLimit:
+        """The limit on whose side nothing is judged."""
 
     @property
     def extent(self) -> float:
