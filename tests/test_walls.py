@@ -26,7 +26,7 @@ KITS = {
 }
 OPEN = {"queries", "actions", "wording", "kinds", "keys", "figures", "pictures", "glance", "chart", "charts"}
 """Doors of a room. Wording and figures are pure: values in, sentences and pictures out."""
-OPEN_TO_VIEWS = {"schemas", "confirmation", "request", "reader", "outcomes", "answers", "records"}
+OPEN_TO_VIEWS = {"schemas", "confirmation", "verbs", "request", "reader", "outcomes", "answers", "records"}
 """A page that composes rooms takes their forms and answers as well."""
 EVERYBODY = {f"app.access.{name}" for name in ("callers", "deps", "devices", "identification", "sign_in")}
 """Who calls is a plain value that everybody may speak of; so is how people and devices show who they are."""

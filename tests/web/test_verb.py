@@ -1,6 +1,5 @@
 """Verbs: an act is done once or not at all, whoever sends it how often, and its form is read by the types of its body."""
 
-import asyncio
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, field
@@ -14,6 +13,7 @@ from app.errors import Conflict, Invalid, NotFound
 from app.web.api import api_router
 from app.web.fields import Body, Length, Reason
 from app.web.verb import Size, Verb, carry_out, draw, named, said
+from tests.loops import run
 
 
 class Transaction:
@@ -150,4 +150,4 @@ def test_the_json_route_has_name_and_text_of_the_act() -> None:
         async with httpx.AsyncClient(transport=httpx.ASGITransport(app), base_url="http://doors") as client:
             return (await client.post("/api/v1/doors/3/close", json={"reason": "Cold"})).json()
 
-    assert asyncio.run(answered()) == [3, "closed Cold"]
+    assert run(answered()) == [3, "closed Cold"]
