@@ -58,7 +58,10 @@ def period_of(fields: Mapping[str, str], zone: ZoneInfo | None = None) -> Period
             _("Correct the named fields and send it again."),
             errors=errors,
         )
-    return in_order(Period(bounds["from"], bounds["to"]))
+    period = Period(bounds["from"], bounds["to"])
+    if period.bounded and period.start == period.end and cell_values.day(fields["to"]) is not None:
+        raise _backwards(fields["from"], fields["to"])  # the day after that day
+    return in_order(period)
 
 
 def in_order(period: Period) -> Period:
@@ -66,8 +69,10 @@ def in_order(period: Period) -> Period:
     if period.backwards:
         assert period.start is not None
         assert period.end is not None
-        message = _("{start} is later than `to` {end}; exchange the two").format(
-            start=period.start.isoformat(), end=period.end.isoformat()
-        )
-        raise Invalid.at("from", message, do=_("Exchange the two moments."))
+        raise _backwards(period.start.isoformat(), period.end.isoformat())
     return period
+
+
+def _backwards(start: str, end: str) -> Invalid:
+    message = _("{start} is later than `to` {end}; exchange the two").format(start=start, end=end)
+    return Invalid.at("from", message, do=_("Exchange the two moments."))

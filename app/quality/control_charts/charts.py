@@ -180,12 +180,14 @@ def _anew(baseline: Baseline, first: Whole) -> list[int]:
 
 
 def _moving_ranges(points: Charted, window: Window) -> View:
-    """Ranges of neighbours; none over a change of tool, of the reference or of the process. Lies where the second does."""
+    """Ranges of neighbours; none over a change of tool or of the reference, nor into the baseline's period, before which the
+    process was another one. Lies where the second does.
+    """
     before = points.series.sequence < window.first
     start = max(0, int(before.sum()) - 1)
     series = points.series.only(np.arange(len(points.series)) >= start)
     neighbours = ~series.begins
-    for at in (0, *_anew(points.baseline, series.sequence)):
+    for at in (0, np.searchsorted(series.sequence, points.baseline.first_sequence)):
         neighbours[at : at + 1] = False
     empty = View(
         Chart.MOVING_RANGE,
