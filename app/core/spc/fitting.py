@@ -143,10 +143,15 @@ def density(found: Fitted, at: Floats) -> Floats:
 
 
 def _spread_over_steps(x: Floats, step: float) -> Floats:
-    """The readings in order, equal ones spread evenly over the step of the gauge: rounding makes ties, which no distribution has."""
-    values, counts = np.unique(np.round(x / step), return_counts=True)
-    place = np.arange(len(x)) - np.repeat(np.cumsum(counts) - counts, counts)
-    return np.asarray((np.repeat(values, counts) - 0.5 + (place + 0.5) / np.repeat(counts, counts)) * step)
+    """The readings in order, equal ones spread evenly over the step of the gauge: rounding makes ties, which no distribution has.
+
+    One that has no equal stays where it is. The step is known to 12 decimals: as a grid it would move readings by the unit.
+    """
+    x = np.sort(x)
+    groups = np.concatenate(([0], np.cumsum(np.diff(x) > step / 2)))
+    counts = np.bincount(groups)[groups]
+    place = np.arange(len(x)) - np.searchsorted(groups, groups)
+    return np.asarray(x + ((place + 0.5) / counts - 0.5) * step)
 
 
 def fit_of_family(family: Family, y: Floats) -> Fit:

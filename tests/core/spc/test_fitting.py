@@ -37,7 +37,10 @@ def test_the_right_one_is_found_and_its_interval_holds_the_truth(family: Family)
     truth = of_percentiles(low, median, high, limits)[1]
     rng, found, held, runs = np.random.default_rng(5), 0, 0, 20
     for _ in range(runs):
-        fit = fitted(draw(rng, 600), limits, side=side)
+        try:
+            fit = fitted(draw(rng, 600), limits, side=side)
+        except Refused:  # the test rejects one right distribution in a hundred
+            continue
         assert fit.ppk.low is not None
         assert fit.ppk.high is not None
         found += fit.fit.family is family
