@@ -11,8 +11,8 @@ from typing import NamedTuple
 
 from app.core.number_text import number_or_none
 from app.files.formats.cell_values import folded
+from app.files.formats.column_names import NAMES
 from app.language.i18n import _
-from app.loop.readings.importing.layout import NAMES
 
 MOST_CHARACTERS = 400_000
 _PARTS = {*map(folded, NAMES["part"]), "parts", "teile", "delovi", "kosi", "sample"}

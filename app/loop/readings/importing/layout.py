@@ -12,45 +12,13 @@ from zoneinfo import ZoneInfo
 from app.errors import FieldError, Invalid
 from app.files.formats import cell_values, delimited, spreadsheet
 from app.files.formats.cell_values import slashed
+from app.files.formats.column_names import NAMES
 from app.files.formats.delimited import Row, Unusable
 from app.files.formats.file_times import FileTimes, times_of
 from app.files.formats.units import LENGTHS, UnknownUnit, unit_in
 from app.language.i18n import _
 from app.loop.readings.origin import COLUMNS
 
-# Folded: lower case, no accents, no unit. The first of a line is the field's own name.
-NAMES: dict[str, tuple[str, ...]] = {
-    "measured": (
-        "measured", "measured value", "measurement", "value", "actual", "actual value", "size", "diameter",
-        "messwert", "wert", "istwert", "ist", "istmass", "mass", "gemessen", "durchmesser",
-        "izmereno", "izmerena vrednost", "vrednost", "mera", "izmerjeno", "izmerjena vrednost", "meritev", "mere",
-        "precnik", "premer", "пречник", "диаметр",
-        "измерено", "измерена вредност", "вредност", "мера", "значение", "измеренное значение", "размер", "результат",
-    ),
-    "measured_at": (
-        "measured at", "time", "timestamp", "date time", "datetime", "date", "date and time", "measured on",
-        "zeit", "zeitpunkt", "zeitstempel", "messzeit", "messzeitpunkt", "datum", "datum uhrzeit", "datum zeit",
-        "vreme", "vreme merenja", "datum i vreme", "cas", "cas meritve", "datum in cas",
-        "време", "време мерења", "датум", "датум и време", "время", "время измерения", "дата", "дата и время",
-    ),
-    "machined_at": (
-        "machined at", "cut at", "bearbeitet", "gefertigt", "gefertigt am", "obradeno", "vreme obrade", "izdelano",
-        "cas izdelave", "обрађено", "време обраде", "обработано", "время обработки",
-    ),
-    "part": (
-        "part", "part number", "part id", "partnb", "serial", "serial number", "sn", "teil", "teilenummer", "teile nr", "seriennummer",
-        "werkstuck", "deo", "komad", "serijski broj", "kos", "obdelovanec", "serijska stevilka",
-        "део", "комад", "серијски број", "деталь", "номер детали", "серийный номер",
-    ),
-    "characteristic": (
-        "characteristic", "characteristic name", "feature", "feature name", "merkmal", "merkmalsname", "karakteristika",
-        "znacilnost", "карактеристика", "характеристика",
-    ),
-    "key": ("key", "schlussel", "kljuc", "ключ", "кључ"),
-    "correction_in_effect": ("correction in effect",),
-    "touches": ("touches",),
-    "context": ("context",),
-}  # fmt: skip
 MOST_COLUMNS = 500
 TOP = 50  # rows in which the header is looked for
 ORIGIN = COLUMNS[:2]

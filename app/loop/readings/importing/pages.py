@@ -12,6 +12,7 @@ from app.access.deps import Caller, Engineer, require
 from app.db.engine import Database
 from app.errors import InbandError, Invalid
 from app.files.formats import delimited
+from app.files.formats.column_names import NAMES
 from app.files.formats.delimited import ENCODINGS
 from app.language.i18n import _
 from app.language.times import plant_zone
@@ -20,7 +21,7 @@ from app.loop.readings.importing import uploads, wide
 from app.loop.readings.importing.actions import import_readings
 from app.loop.readings.importing.aqdef import form as aqdef_form
 from app.loop.readings.importing.history import Flawed
-from app.loop.readings.importing.layout import NAMES, NO_DIGIT, Layout, Wishes, refuse_incomplete
+from app.loop.readings.importing.layout import NO_DIGIT, Layout, Wishes, refuse_incomplete
 from app.loop.readings.importing.lines import look_apart, read_apart
 from app.loop.readings.importing.preview import TRIED_WHOLE, Preview, PreviewLine, first_lines, preview
 from app.loop.readings.importing.uploads import Upload
