@@ -4,10 +4,11 @@ The border stands here for moments and columns of moments; `app.db.period` says 
 """
 
 from datetime import UTC, datetime, timedelta
-from typing import NamedTuple, Self
+from typing import TYPE_CHECKING, NamedTuple, Self
 
-import numpy as np
-from numpy.typing import NDArray
+if TYPE_CHECKING:  # commands take periods, and start sooner without NumPy
+    import numpy as np
+    from numpy.typing import NDArray
 
 
 class Period(NamedTuple):
@@ -44,8 +45,10 @@ class Period(NamedTuple):
         """
         return (self.start is None or first >= self.start) and (self.end is None or last < self.end)
 
-    def among(self, moments: NDArray[np.datetime64]) -> NDArray[np.bool_]:
+    def among(self, moments: "NDArray[np.datetime64]") -> "NDArray[np.bool_]":
         """Mask of the moments (UTC) that lie in it."""
+        import numpy as np
+
         inside = np.ones(len(moments), np.bool_)
         if self.start is not None:
             inside &= moments >= moment_of(self.start)
@@ -57,6 +60,8 @@ class Period(NamedTuple):
 ALWAYS = Period()
 
 
-def moment_of(at: datetime) -> np.datetime64:
+def moment_of(at: datetime) -> "np.datetime64":
     """As NumPy keeps it, in UTC."""
+    import numpy as np
+
     return np.datetime64(at.astimezone(UTC).replace(tzinfo=None), "us")
