@@ -23,8 +23,8 @@ class IndexOut(BaseModel):
     """An index with its two-sided confidence interval."""
 
     value: float
-    low: float | None
-    high: float | None
+    low: float | None = Field(description="Low end of the interval.")
+    high: float | None = Field(description="High end of the interval.")
     method: str | None = Field(
         description="Of the interval: `chi_square`, `bissell`, `noncentral_t`, `boyles`, `delta`, `order_statistics`."
     )
@@ -39,8 +39,8 @@ class FalloutOut(BaseModel):
     """Parts per million beyond the limits."""
 
     below: float | None = Field(description="null beyond a natural limit.")
-    above: float | None
-    total: float
+    above: float | None = Field(description="null beyond a natural limit.")
+    total: float = Field(description="Beyond either limit.")
 
     @classmethod
     def of(cls, found: Fallout | None, natural: NaturalLimit) -> "FalloutOut | None":
@@ -113,9 +113,9 @@ class FittedOut(FitOut):
     """Pp and Ppk by the distribution that fits (ISO 22514-2)."""
 
     low: float = Field(description="X0.135 %")
-    median: float
+    median: float = Field(description="X50 %")
     high: float = Field(description="X99.865 %")
-    pp: float | None
+    pp: float | None = Field(description="The tolerance by X99.865 % - X0.135 %; null with one limit.")
     ppk: IndexOut
     ppm: FalloutOut = Field(description="Expected of this distribution.")
     why: str = Field(description="Why this one.")
@@ -125,13 +125,13 @@ class FittedOut(FitOut):
 class ToleranceIntervalOut(BaseModel):
     """An interval in which at least a share of all parts lies, with a confidence (ISO 16269-6), mm from the target."""
 
-    share: float
-    confidence: float
+    share: float = Field(description="Of all parts, that lies in it at least: 0.9973.")
+    confidence: float = Field(description="Probability that such an interval holds that share.")
     method: Literal["normal", "extremes"] = Field(
         description="By the normal distribution (exact factor), or from the smallest reading to the largest."
     )
     low: float | None = Field(description="null where only the upper limit counts.")
-    high: float | None
+    high: float | None = Field(description="null where only the lower limit counts.")
     k: float | None = Field(description="Factor of the standard deviation; null by extremes.")
     reached: float = Field(description="The confidence that was reached; by extremes it is not below `confidence`.")
 
@@ -139,16 +139,16 @@ class ToleranceIntervalOut(BaseModel):
 class MachinePerformanceOut(BaseModel):
     """Pm and Pmk (ISO 22514-3) of the newest run of parts in which nothing was changed."""
 
-    readings: int
+    readings: int = Field(description="Of the run.")
     first_sequence: int | None
     last_sequence: int | None
-    first_at: datetime | None
-    last_at: datetime | None
+    first_at: datetime | None = Field(description="Time of its first reading; null without readings.")
+    last_at: datetime | None = Field(description="Time of its last reading.")
     left_out: int = Field(description="Readings in between that were excluded, or probe faults.")
-    mean: float | None
-    sigma: float | None
-    pm: IndexOut | None
-    pmk: IndexOut | None
+    mean: float | None = Field(description="In mm from the target.")
+    sigma: float | None = Field(description="Standard deviation of all its readings, mm.")
+    pm: IndexOut | None = Field(description="The tolerance by the spread; null with one limit.")
+    pmk: IndexOut | None = Field(description="To the nearer limit.")
     distribution: Family | None = Field(description="The distribution that they are by; null: normal.")
     refused: str | None = Field(description="Why there is no Pmk.")
 

@@ -47,14 +47,14 @@ class CountsOut(Body):
     """A chart of counts: columns of equal length."""
 
     chart: CountChart
-    points: list[float]
-    centre: list[float]
-    lower: list[float]
-    upper: list[float]
+    points: list[float] = Field(description="Of each sample: its count, share or rate, as the chart draws it.")
+    centre: list[float] = Field(description="Centre line at each point.")
+    lower: list[float] = Field(description="Lower control limit at each point.")
+    upper: list[float] = Field(description="Upper control limit at each point.")
     outside: list[int] = Field(description="Samples beyond a limit, counted from 1.")
     sigma_z: float = Field(description="Scatter of the points as a share of what binomial or Poisson counts have.")
     provisional: bool = Field(description="Limits of fewer than 20 samples.")
-    advice: list[str]
+    advice: list[str] = Field(description="Sentences on what to do about the samples or the chart.")
 
 
 @router.post("/count-charts", dependencies=[require("viewer")])

@@ -41,7 +41,7 @@ class ForecastOut(BaseModel):
         "corrections from now on. offset: the sum of corrections reaches max_total."
     )
     limit: float = Field(description="Where the limit lies on the wear curve.")
-    parts: float
+    parts: float = Field(description="From the newest reading on, as the line runs.")
     low: float = Field(
         description="95 % interval of a single part, with room for run-in, even wear and a steep end: from here on parts may lie beyond."
     )
