@@ -39,8 +39,8 @@ class Tolerance(NamedTuple):
     def room(self, mean: float) -> float:
         """Distance of a mean from the nearer limit, mm; negative beyond it.
 
-        >>> Tolerance(-0.008, 0.008).room(0.001), Tolerance(None, 0.0127).room(0.0027)
-        (0.007, 0.01)
+        >>> Tolerance(-0.008, 0.008).room(0.001), Tolerance(None, 0.0127).room(0.0127)
+        (0.007, 0.0)
         """
         return min(abs(limit) - (mean if limit > 0 else -mean) for limit in self.judged)
 

@@ -13,6 +13,7 @@ import re
 from collections.abc import Iterator, Mapping
 from typing import Any
 
+from app.core.natural import assumed, half_width
 from app.core.number_text import has_printed_minus, plain
 from app.core.parameters import BY_NAME, FieldKind, Parameters, mean_nominal
 from app.core.programs import printed_macros, unit_check
@@ -328,7 +329,8 @@ def _complete(parameters: dict[str, Any], notes: list[Note]) -> None:
     width = parameters.get("tolerance_width")
     if all(name in parameters for name in ("nominal", "upper_deviation", "lower_deviation")):
         width = mean_nominal(*(parameters[name] for name in ("nominal", "upper_deviation", "lower_deviation")))[1]
-    wear = max(WEAR_LIMIT, (width or 0.0) / 2)
+    natural = parameters.get("natural_limit") or assumed(parameters)
+    wear = max(WEAR_LIMIT, half_width(width or 0.0, natural))
     for name, value in (("wear_limit", wear), ("confidence_limit", max(CONFIDENCE_LIMIT, wear))):
         if name not in parameters:
             parameters[name] = value
@@ -372,8 +374,8 @@ def pointed(value: float) -> str:
 
 def write_measuring(parameters: Parameters, about: Mapping[str, str], values: Mapping[str, float]) -> str:
     """The variables of the lathe line and the call of its measuring macro; `read` makes the same parameters of it."""
-    upper = parameters.upper_deviation if parameters.nominal is not None else parameters.tolerance_width / 2
-    lower = parameters.lower_deviation if parameters.nominal is not None else -parameters.tolerance_width / 2
+    upper = parameters.upper_deviation if parameters.nominal is not None else parameters.tolerance.upper
+    lower = parameters.lower_deviation if parameters.nominal is not None else parameters.tolerance.lower
     nominal = parameters.nominal if parameters.nominal is not None else parameters.target
     written = {"tool_memory", "nominal", "upper_deviation", "lower_deviation"}
     comments = [*describing(about), *settings(parameters, written, implied())]

@@ -13,6 +13,7 @@ from types import MappingProxyType
 from typing import Any, NamedTuple
 
 from app.core.decision.step import rounded
+from app.core.natural import NaturalLimit, assumed
 from app.core.number_text import number_or_none, plain
 from app.core.parameters import BY_NAME, FIELDS, Field, FieldKind, Parameters
 
@@ -263,6 +264,8 @@ def settings(
     """
     values = parameters.as_dict()
     expected = {field.name: field.default for field in FIELDS} | {"accept": {"n": 1, "m": 1}} | dict(implied)
+    if assumed(values) is NaturalLimit.NONE:  # else both are said, for the reader of a text without it would assume one
+        expected["natural_limit"] = NaturalLimit.NONE.value
     if parameters.nominal is not None:  # target and width follow from the drawing (L75)
         expected |= {name: values[name] for name in ("target", "tolerance_width")}
     for name in (*BY_NAME, *(name for name in values if name not in BY_NAME)):

@@ -4,7 +4,8 @@ from typing import Any
 
 from hypothesis import strategies as st
 
-from app.core.parameters import FIELDS, Feature, Field, FieldKind, Parameters, read
+from app.core.natural import NaturalLimit, assumed, half_width
+from app.core.parameters import FIELDS, Feature, Field, FieldKind, Mode, Parameters, read
 
 ORDERED = ("zero_range", "averaging_limit", "wear_limit", "confidence_limit")
 SIZE = ("nominal", "upper_deviation", "lower_deviation", "target", "tolerance_width")
@@ -27,20 +28,28 @@ def _value(field: Field) -> st.SearchStrategy[Any]:
     return _length(lowest, highest)
 
 
+def _ordered(draw: st.DrawFn, half: float) -> dict[str, float]:
+    """Limits in their order. half: distance of the limits of size from the target, mm."""
+    inner = draw(st.tuples(st.floats(0, 0.49), st.floats(0.5, 1.0)))
+    beyond = _length(max(1.0, half + 2e-6), 5.0)
+    wear, confidence = sorted(draw(st.tuples(beyond, beyond)))
+    return {
+        "zero_range": round(inner[0] * half, 9),
+        "averaging_limit": round(inner[1] * half - 2e-6, 9),
+        "wear_limit": wear,
+        "confidence_limit": confidence,
+    }
+
+
 @st.composite
 def parameter_sets(draw: st.DrawFn) -> Parameters:
     width = draw(_length(0.001, 2.0))
-    inner = draw(st.tuples(st.floats(0, 0.49), st.floats(0.5, 1.0)))
-    outer = sorted(draw(st.tuples(_length(1.0, 5.0), _length(1.0, 5.0))))
-    given: dict[str, Any] = {
-        "zero_range": round(inner[0] * width / 2, 9),
-        "averaging_limit": round(inner[1] * width / 2 - 2e-6, 9),
-        "wear_limit": outer[0],
-        "confidence_limit": outer[1],
-    }
+    given: dict[str, Any] = {}
     if draw(st.booleans()):
-        lower = draw(_length(-5.0, 5.0))
-        given |= {"nominal": draw(_length(-500.0)), "lower_deviation": lower, "upper_deviation": lower + width}
+        # From 0 up, a set that does not say its natural limit has one.
+        sizes = st.one_of(st.just((0.0, 0.0)), st.tuples(_length(-500.0), _length(-5.0, 5.0)))
+        nominal, lower = draw(sizes)
+        given |= {"nominal": nominal, "lower_deviation": lower, "upper_deviation": lower + width}
     else:
         given |= {"target": draw(_length(-500.0)), "tolerance_width": width}
     for field in FIELDS:
@@ -54,4 +63,7 @@ def parameter_sets(draw: st.DrawFn) -> Parameters:
         given["feature"] = "outside"
     if given["factor"] == 0:
         given["factor"] = -0.5
-    return read(given)[0]  # a refusal here: a rule is younger than this strategy
+    if given.get("natural_limit", NaturalLimit.NONE) != NaturalLimit.NONE and given.get("tool_memory"):
+        given["mode"] = Mode.MEASURE_ONLY.value
+    half = half_width(width, given.get("natural_limit") or assumed(given))
+    return read(given | _ordered(draw, half))[0]  # a refusal here: a rule is younger than this strategy

@@ -307,6 +307,15 @@ def test_a_characteristic_survives_its_macro_text(parameters: Parameters, values
     assert fanuc.write_measuring(again, program.about, program.values) == text
 
 
+def test_the_whole_tolerance_lies_on_one_side_of_a_natural_limit() -> None:
+    given = {"target": 0, "tolerance_width": 0.8, "natural_limit": "lower", "zero_range": 0, "wear_limit": 1}
+    text = fanuc.write_measuring(read(given | {"confidence_limit": 1})[0], {}, {})
+    assert "#506=0.8 (UPPER DEVIATION ES)" in text
+    assert "#507=0. (LOWER DEVIATION EI)" in text
+    foreign = program_of("#505=0.\n#506=0.8\n#507=0.\nG65 P9011 A0.").parameters
+    assert read(foreign)[0].wear_limit == 0.8  # no limit of wear lies inside the tolerance
+
+
 def test_the_lathe_line_needs_few_comments() -> None:
     parameters, _warnings = read(program_of(BORE).parameters)
     text = fanuc.write_measuring(parameters, {}, program_of(BORE).values)

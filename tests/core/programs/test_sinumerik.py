@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 
 from app.core.parameters import Parameters, read
 from app.core.probing import direction_of
-from app.core.programs import sinumerik
+from app.core.programs import fanuc, sinumerik
 from app.core.programs.lines import LineVerdict, ProgramError, ProgramKind, ProgramText, written
 from app.core.programs.sinumerik_writing import Calibration, write_calibration, write_measuring
 from app.loop.programs.wording import note
@@ -379,6 +379,39 @@ def test_a_characteristic_survives_its_program_text(parameters: Parameters, name
     again, _warnings = read(found.program.parameters)
     assert again == parameters
     assert write_measuring(again, found.program.about) == text
+
+
+RUNOUT = {
+    "nominal": 0,
+    "upper_deviation": 0.02,
+    "lower_deviation": 0,
+    "zero_range": 0,
+    "wear_limit": 1,
+    "confidence_limit": 1,
+}
+
+
+@pytest.mark.parametrize(
+    ("changed", "comment"),
+    [
+        ({}, "(INBAND NATURAL_LIMIT=LOWER)"),
+        ({"natural_limit": "none"}, "(INBAND NATURAL_LIMIT=NONE)"),  # else it would be read as one
+        ({"natural_limit": "upper", "lower_deviation": -0.02, "upper_deviation": 0}, "(INBAND NATURAL_LIMIT=UPPER)"),
+        ({"nominal": 10}, None),
+        ({"tool_memory": 3, "factor": -1}, None),
+    ],
+)
+def test_a_natural_limit_is_said_where_it_would_not_be_read(changed: dict[str, object], comment: str | None) -> None:
+    parameters, _warnings = read(RUNOUT | changed)
+    for reader, text in (
+        (sinumerik, write_measuring(parameters, {})),
+        (fanuc, fanuc.write_measuring(parameters, {}, {})),
+    ):
+        said = [line for line in text.splitlines() if "NATURAL_LIMIT" in line]
+        assert said == ([] if comment is None else [comment])
+        program = reader.read(text).program
+        assert program is not None
+        assert read(program.parameters)[0] == parameters
 
 
 @examples(50)

@@ -25,7 +25,8 @@ def test_the_codes_were_found() -> None:
     ),
 )
 def test_every_code_has_words(code: str) -> None:
-    sentence = wording.sentence(Problem("zero_range", code, {"choices": ("a", "b"), "other": "R33", "value": 1.5}))
+    data = {"choices": ("a", "b"), "other": "R33", "value": 1.5, "limit": 0.0, "name": "Run-out"}
+    sentence = wording.sentence(Problem("zero_range", code, data))
     assert sentence != code
     assert " " in sentence
 
