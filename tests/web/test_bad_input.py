@@ -227,6 +227,13 @@ BODIES: dict[str, dict[str, Any]] = {
         "key": "bad-form",
     },
     "POST /api/v1/forms/{number}/recompute": WHY,
+    "POST /api/v1/count-charts": {
+        "chart": "np",
+        "counts": [4, 2, 5, 3],
+        "inspected": 50,
+        "baseline": 3,
+        "centre": 0.06,
+    },
     "POST /api/v1/alignments": {
         "machine": "{machine}",
         "kind": "two_points",

@@ -17,7 +17,7 @@ TEMPLATES = sorted(path.relative_to(TEMPLATE_DIR).as_posix() for path in TEMPLAT
 READ_ATTRIBUTES = {"alt", "aria-label", "placeholder", "title"}
 WORD = re.compile(r"[^\W\d_]{3,}")
 # Symbols of the standards too: they are the same in every language.
-NAMES = {"Inband", "curl", "Cpk", "Cpm", "Ppk", "ndc", "ppm"}
+NAMES = {"Inband", "curl", "Cpk", "Cpm", "Pmk", "Ppk", "ndc", "ppm"}
 UNREAD = {"script", "style", "code", "kbd", "svg", "template"}
 TRANSLATING = {"_", "gettext", "ngettext", "pgettext", "npgettext"}
 HOLE = "\N{OBJECT REPLACEMENT CHARACTER}"  # where the template puts a value

@@ -19,8 +19,8 @@ from app.web.fields import Body
 router = api_router("control charts")
 
 LARGEST = 1e12
-Count = Annotated[float, Field(ge=0, le=LARGEST)]
-Inspected = Annotated[float, Field(gt=0, le=LARGEST)]
+Count = Annotated[float, Field(strict=True, ge=0, le=LARGEST)]
+Inspected = Annotated[float, Field(strict=True, gt=0, le=LARGEST)]
 
 
 class CountsIn(Body):
@@ -40,7 +40,9 @@ class CountsIn(Body):
     baseline: int | None = Field(
         None, ge=2, le=MOST, strict=True, description="So many first samples give centre and limits; all if left out."
     )
-    centre: float | None = Field(None, gt=0, description="A share or rate that is given, and not estimated.")
+    centre: float | None = Field(
+        None, strict=True, gt=0, le=LARGEST, description="A share or rate that is given, and not estimated."
+    )
 
 
 class CountsOut(Body):

@@ -6,27 +6,12 @@
 //   – marks a limit that breaks R33 < R34 ≤ R35/2 ≤ R37 ≤ R36, and says why at the field, in the server's own sentences.
 // The server checks the same again when the form is sent; without this script nothing is lost but the immediacy.
 
+import { deviation, millimetres, MINUS, nanometres, plain, size, typed, usable } from "./sizes.js";
 import { here } from "./root.js";
 
 const NAMES = ["nominal", "upper_deviation", "lower_deviation", "target", "tolerance_width",
   "zero_range", "averaging_limit", "wear_limit", "confidence_limit"];
 const ORDER = ["zero_range", "averaging_limit", "tolerance", "wear_limit", "confidence_limit"];
-const MINUS = "\u2212";
-
-/** What is typed, as a number of mm; null if empty, NaN if it is none. A comma is a point, as the server has it. */
-export function typed(text) {
-  const cleaned = text.trim().replaceAll(MINUS, "-").replaceAll(",", ".").replaceAll("\u00a0", "");
-  if (cleaned === "") return null;
-  return /^[+-]?(\d+\.?\d*|\.\d+)(e[+-]?\d+)?$/i.test(cleaned) ? Number(cleaned) : NaN;
-}
-const usable = (value) => value !== null && Number.isFinite(value);
-const nanometres = (mm) => Math.round(mm * 1e6);
-/** At least four decimals, none hidden: 0.0090 mm. */
-const millimetres = (mm) => `${mm.toFixed(9).replace(/(\.\d{4}\d*?)0+$/, "$1")} mm`;
-const plain = (value, digits = 6) => String(Number(value.toPrecision(digits)));
-const deviation = (mm) => (Math.abs(mm) >= 1 ? `${plain(Math.abs(mm), 4)}\u00a0mm` : `${plain(Math.abs(mm) * 1000, 4)}\u00a0µm`);
-const size = (mm) => `${mm < 0 ? MINUS : ""}${Math.abs(mm).toFixed(4)}`;
-
 customElements.define("zone-diagram", class extends HTMLElement {
   connectedCallback() {
     this.form = this.closest("form");
