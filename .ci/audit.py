@@ -45,7 +45,7 @@ def _why_not(stderr: str) -> str:
     if re.search(r"connect|resol|timed? ?out|retries|unreachable|proxy|ServiceError", stderr, re.IGNORECASE):
         return (
             "no database of known vulnerabilities can be reached from here, so nothing is known of any library; "
-            f"run make audit where pypi.org can be reached ({last})."
+            f"run make audit where one can be reached ({last})."
         )
     return f"pip-audit, which looks the libraries up, has failed ({last})."
 

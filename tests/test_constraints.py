@@ -73,7 +73,7 @@ def test_libraries_of_an_installation_are_those_of_the_server(tmp_path: Path) ->
             "INFO\nrequests.exceptions.ConnectionError: Max retries exceeded\n",
             (
                 "Not judged: no database of known vulnerabilities can be reached from here, so nothing is known of any library; run "
-                "make audit where pypi.org can be reached (requests.exceptions.ConnectionError: Max retries exceeded).\n"
+                "make audit where one can be reached (requests.exceptions.ConnectionError: Max retries exceeded).\n"
             ),
         ),
         (
