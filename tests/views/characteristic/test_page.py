@@ -175,7 +175,15 @@ class TestInTheBrowser:
         viewer.sign_in(page)
         page.goto(path(shop))
         eventually(page, "document.querySelector('plotly-chart.zones').tabIndex === 0")
-        page.locator("plotly-chart.zones .scatterlayer .trace .points path").nth(1).click(force=True)
+        where = page.evaluate(
+            """() => {
+                const point = document.querySelectorAll("plotly-chart.zones .scatterlayer .trace .points path")[1];
+                point.scrollIntoView({ block: "center", behavior: "instant" });
+                const box = point.getBoundingClientRect();
+                return [box.x + box.width / 2, box.y + box.height / 2];
+            }"""
+        )
+        page.mouse.click(*where)  # in place: the chart may draw its points once more between
         panel = page.locator("plotly-chart.zones .chart-panel")
         expect(panel).to_contain_text("beyond the averaging limit 5.0 µm: corrected in full.")
         expect(panel).to_contain_text(f"Correction {number}")
