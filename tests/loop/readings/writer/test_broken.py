@@ -143,11 +143,19 @@ class TestConnection:
         chance = random.Random(4)
         senders = crew(shop, server)
         cut = 0
+
+        def answered() -> int:
+            return sum(len(sender.answers) for sender in senders)
+
+        def until_more(answers: int) -> None:
+            until(lambda: answered() > answers)
+
         with psycopg.connect(server.database.dsn, autocommit=True) as connection:
 
             def disturb() -> None:
                 nonlocal cut
                 while cut < cuts:
+                    until_more(answered())  # a busy computer gets nothing done between cuts that follow one another
                     time.sleep(chance.uniform(0.01, 0.1))  # at any moment
                     cut += len(connection.execute(f"SELECT pg_terminate_backend(pid) {WRITERS}").fetchall())
 
