@@ -7,12 +7,13 @@ from pydantic import Field
 
 from app.errors import Invalid
 from app.language.i18n import _
-from app.web.fields import Body, Reason
+from app.web.fields import IN_UM, Body, Reason
 
 MOST_TOUCHES = 1000  # a hundred holes of a plate, ten touches each
 
 Repeatability = Annotated[
     float,
+    IN_UM,
     Field(
         strict=True,
         gt=0,

@@ -102,6 +102,8 @@ Text200 = Annotated[
 
 CHOSEN = "one of some likely ones, and what is typed besides as `more`"
 """How a form asks for a field."""
+IN_UM = "typed in µm"
+"""Mark of a length in mm that a form asks for in µm."""
 
 Reason = Annotated[
     str,

@@ -1,6 +1,7 @@
 """Forms that people send: read by the same schemas as JSON, and shown again with everything they typed."""
 
-from collections.abc import Iterable, Mapping
+import re
+from collections.abc import Callable, Iterable, Mapping
 from types import UnionType
 from typing import Annotated, Any, TypeVar, Union, get_args, get_origin
 
@@ -10,10 +11,11 @@ from pydantic.fields import FieldInfo
 from app.core.number_text import number_or_none
 from app.errors import FieldError, InbandError, Invalid
 from app.language.i18n import _
-from app.web.fields import CHOSEN
+from app.web.fields import CHOSEN, IN_UM
 from app.web.validation import field_errors
 
 Schema = TypeVar("Schema", bound=BaseModel)
+BETWEEN = re.compile(r"[\s;]+")
 
 
 def parsed(schema: type[Schema], fields: Mapping[str, Any]) -> Schema:
@@ -26,45 +28,59 @@ def parsed(schema: type[Schema], fields: Mapping[str, Any]) -> Schema:
         raise Invalid(_("The form has to be corrected."), errors=errors) from None
 
 
-def typed(schema: type[Schema], form: Mapping[str, str]) -> Schema:
+def typed(schema: type[Schema], form: Mapping[str, str], **more: Any) -> Schema:
     """The form as the API's schema: each field that bears a name of the schema is read as its type says. Raises `Invalid`.
 
-    A length with comma or minus as people type it, whole numbers between commas, a tick, a reason chosen or in own words (`words`).
+    more: what was read otherwise, in place of the form's field; None: left out.
     """
-    return parsed(schema, {name: _read(form, name, field) for name, field in schema.model_fields.items()})
+    return parsed(schema, read(schema, form) | more)
 
 
-def _read(form: Mapping[str, str], name: str, field: FieldInfo) -> Any:
+def read(schema: type[BaseModel], form: Mapping[str, str]) -> dict[str, Any]:
+    """What a form says of each field of a schema, by name.
+
+    A length with comma or minus as people type it, in µm where the field says so; numbers between blanks, a tick, a reason
+    chosen or in own words (`words`).
+    """
+    return {name: _read(form, name, _kinds(field)) for name, field in schema.model_fields.items()}
+
+
+def _read(form: Mapping[str, str], name: str, kinds: set[Any]) -> Any:
     text = form.get(name, "").strip()
-    if CHOSEN in field.metadata:
+    if CHOSEN in kinds:
         return words(form, name)
-    kinds = _kinds(field.annotation)
     if bool in kinds:
         return text == "true" or None
     if list in kinds:
-        return whole_numbers(text)
+        return (lengths(text) if float in kinds else whole_numbers(text)) or None
     if float in kinds:
-        return length(text)
+        return micrometres(text) if IN_UM in kinds else length(text)
     return whole(text) if int in kinds else text
 
 
 def _kinds(annotation: Any) -> set[Any]:
-    """The plain types of an annotation, without the rules beside them: {float, NoneType} of an optional length."""
-    origin = get_origin(annotation)
+    """The plain types of an annotation and the marks beside them: {float, NoneType} of an optional length, {list, int}."""
+    if isinstance(annotation, FieldInfo):
+        return {mark for mark in annotation.metadata if isinstance(mark, str)} | _kinds(annotation.annotation)
+    origin, arguments = get_origin(annotation), get_args(annotation)
     if origin is Annotated:
-        return _kinds(get_args(annotation)[0])
-    if origin in (Union, UnionType):
-        return {kind for each in get_args(annotation) for kind in _kinds(each)}
+        return _kinds(arguments[0]) | {mark for mark in arguments[1:] if isinstance(mark, str)}
+    if origin in (Union, UnionType, list):
+        return {kind for each in arguments for kind in _kinds(each)} | {origin}
     return {origin or annotation}
 
 
-def by_field(error: InbandError) -> dict[str, str]:
-    """Errors by the name of the field in the form."""
+def by_field(error: InbandError, at: Callable[[str, str], tuple[str, str]] = lambda *same: same) -> dict[str, str]:
+    """Errors by the name of the field in the form, each sentence once.
+
+    at: from a field of the API and its message, the field of the form and the message there.
+    """
     messages: dict[str, str] = {}
     for field, message in error.errors:
-        name = field.removeprefix("parameters.")
-        sentence = message[:1].upper() + message[1:]
-        messages[name] = f"{messages[name]}. {sentence}" if name in messages else sentence
+        name, words = at(field.removeprefix("parameters."), message)
+        sentence = words[:1].upper() + words[1:]
+        if sentence not in messages.get(name, ""):
+            messages[name] = f"{messages[name]}. {sentence}" if name in messages else sentence
     return messages
 
 
@@ -96,6 +112,15 @@ def whole(text: str | None) -> int | str | None:
 def whole_numbers(text: str | None) -> list[int | str | None]:
     """Whole numbers between commas, semicolons or blanks."""
     return [whole(number) for number in (text or "").replace(",", " ").replace(";", " ").split()]
+
+
+def lengths(text: str | None) -> list[float | str | None]:
+    """Lengths in mm between blanks, semicolons or line ends, with a decimal point or comma.
+
+    >>> lengths("199,852 199.8531")
+    [199.852, 199.8531]
+    """
+    return [length(number) for number in BETWEEN.split((text or "").strip()) if number]
 
 
 def characteristics_typed(form: Mapping[str, str], results: Iterable[str]) -> dict[str, str]:

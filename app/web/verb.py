@@ -9,14 +9,15 @@ from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 from typing import Annotated, Any, Generic, Literal, NamedTuple, Protocol, TypeVar
 
-from fastapi import APIRouter, Depends
+from fastapi import APIRouter, Depends, Request, Response
 from pydantic import BaseModel
 from sqlalchemy.orm import Session
 
-from app.errors import Conflict, NotFound
+from app.errors import Conflict, InbandError, NotFound
 from app.language.i18n import _
 from app.web.api import problems
-from app.web.forms import typed
+from app.web.forms import by_field, typed
+from app.web.templates import page
 
 
 class Subject(Protocol):
@@ -50,10 +51,15 @@ class Said(NamedTuple):
 
 
 class Outcome(NamedTuple):
-    """The end of an act: done; late, somebody else was first; ask, the question is another one now."""
+    """The end of an act: done; late, somebody else was first; ask, the question is another one now.
+
+    result: what the act returned; refused: why it is late, in words.
+    """
 
     kind: Literal["done", "late", "ask"]
     said: Said
+    result: Any = None
+    refused: str = ""
 
 
 @dataclass(frozen=True)
@@ -70,7 +76,10 @@ class Size:
 
 @dataclass(frozen=True)
 class Question:
-    """Content of a confirmation dialog: what follows, reasons to choose from, where it is sent, and hidden fields."""
+    """Content of a confirmation dialog: what follows, reasons to choose from, where it is sent, and hidden fields.
+
+    where: the place at the machine that it is about.
+    """
 
     title: str
     button: str
@@ -79,6 +88,7 @@ class Question:
     size: Size | None = None
     send_to: str = ""
     hidden: dict[str, str] = field(default_factory=dict)
+    where: str = ""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -120,14 +130,16 @@ class Verb(Act[On, Sent]):
 
     def question(self, on: On, send_to: str, **hidden: str) -> Question:
         """The dialog that asks for it, and the form that does it."""
+        values = on.values
         return Question(
-            self.title(on).format(**on.values),
+            self.title(on).format(**values),
             self.word(),
             self.follows(on),
             self.reasons(),
             self.size(on) if self.size else None,
             send_to,
             {"do": self.name, **self.hidden(on), **hidden},
+            values.get("where", ""),
         )
 
 
@@ -141,8 +153,9 @@ def carry_out(verb: Act[On, Sent], on: On, form: Mapping[str, str]) -> Outcome:
         on.session.expire_all()
         if verb.asks_again(error):
             return Outcome("ask", usual)
-        return Outcome("done" if verb.own(on) else "late", usual)
-    return Outcome("done", result if isinstance(result, Said) else usual)
+        refused = f"{error.detail} {error.what_to_do or ''}"
+        return Outcome("done" if verb.own(on) else "late", usual, None, refused)
+    return Outcome("done", result if isinstance(result, Said) else usual, result)
 
 
 def named(verbs: Iterable[Verb[On, Any]], name: str, on: On, back: str) -> Verb[On, Any]:
@@ -156,6 +169,19 @@ def named(verbs: Iterable[Verb[On, Any]], name: str, on: On, back: str) -> Verb[
 def said(verbs: Iterable[Verb[Any, Any]], name: str, number: int) -> str | None:
     """The page's message after the act; None for a name that no verb has."""
     return next((verb.said().format(n=number) for verb in verbs if verb.name == name), None)
+
+
+def ask(
+    request: Request,
+    template: str,
+    question: Question,
+    form: Mapping[str, str] | None = None,
+    error: InbandError | None = None,
+    **context: Any,
+) -> Response:
+    """The page of a question. form, error: what was sent, and why it is refused."""
+    asked: dict[str, Any] = {"question": question, "form": form or {}, "errors": by_field(error) if error else {}}
+    return page(request, template, status=error.status if error else 200, **asked, **context)
 
 
 def draw(

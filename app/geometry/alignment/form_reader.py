@@ -11,9 +11,10 @@ from typing import Any
 from app.core.number_text import has_broken_number
 from app.core.number_text import plain as plain_text
 from app.errors import FieldError, InbandError, Invalid
+from app.geometry.alignment.schemas import AlignmentIn, PalletIn
 from app.language.i18n import _
 from app.web.again import MOST_TOUCHES
-from app.web.forms import by_field, characteristics_typed, length, micrometres, whole, whole_numbers
+from app.web.forms import by_field, characteristics_typed, length, read, typed
 
 KINDS = ("points", "two_points", "two_holes")
 FACES = ("+Z", "+Z", "+Z", "-Y", "-Y", "-X")  # the six points, where nobody says otherwise
@@ -27,7 +28,6 @@ UNKNOWNS = {
     "plane": ["a", "b", "gamma"],
     "shift": ["a", "b", "c"],
 }
-WORDS = ("machine", "kind", "name", "part", "method", "work_offset", "key")
 _NUMBER = re.compile(r"[-+]?(?:\d+(?:\.\d*)?|\.\d+)(?:[eE][-+]?\d{1,2})?")
 _FACE = re.compile(r"(?<!\S)[+-]\s?[XYZ](?!\w)", re.IGNORECASE)
 FormValues = dict[str, Any]
@@ -52,8 +52,7 @@ def blank(kind: str) -> dict[str, str]:
 
 def fields(form: Mapping[str, str]) -> tuple[FormValues, list[str]]:
     """The form as the API takes it, and by touch the line in which it was typed. Raises `Invalid` for a line that is none."""
-    values: FormValues = {name: form.get(name, "").strip() for name in WORDS}
-    values["repeatability"] = micrometres(form.get("repeatability"))
+    values = read(AlignmentIn, form) | dict.fromkeys(("tip", "touches", "side", "holes", "table"))
     base = [length(form.get(f"base_{axis}")) for axis in AXES]
     values["base"] = base if any(value is not None for value in base) else None
     values["solve_for"] = UNKNOWNS.get(form.get("solve_for", ""))
@@ -65,8 +64,7 @@ def fields(form: Mapping[str, str]) -> tuple[FormValues, list[str]]:
             "position": length(form.get("table_position")) or 0.0,
             "clockwise": form.get("table_sense") != "counter",
         }
-    if named := characteristics_typed(form, "abc"):
-        values["characteristics"] = named
+    values["characteristics"] = characteristics_typed(form, "abc") or None
     lines: list[str] = []
     match form.get("kind"):
         case "two_points":
@@ -198,21 +196,12 @@ def _place(row: str, number: int, hole: int) -> list[float]:
 # --- pallets, once more
 
 
-def pallet(form: Mapping[str, str]) -> FormValues:
-    """A pallet and a part on it, as the API takes them."""
-    values: FormValues = {name: whole(form.get(name, "")) for name in ("pallet", "part")}
-    pose = [length(form.get(f"pose_{axis}")) for axis in AXES]
-    turn = length(form.get("pose_turn"))
-    if any(value is not None for value in (*pose, turn)):
-        values["pose"] = {"shift": [0.0 if value is None else value for value in pose], "rotation": turn or 0.0}
-    return values | {name: form.get(name, "").strip() for name in ("name", "key")}
-
-
-def again(form: Mapping[str, str]) -> FormValues:
-    """Computing once more, as the API takes it."""
-    values = {name: form.get(name, "").strip() for name in ("method", "reason")}
-    repeatability = micrometres(form.get("repeatability"))
-    return values | {"repeatability": repeatability, "leave_out": whole_numbers(form.get("leave_out"))}
+def pallet(form: Mapping[str, str]) -> PalletIn:
+    """A pallet and a part on it, as typed. Raises `Invalid`."""
+    place, turn = [length(form.get(f"pose_{axis}")) for axis in AXES], length(form.get("pose_turn"))
+    given = any(value is not None for value in (*place, turn))
+    pose = {"shift": [0.0 if value is None else value for value in place], "rotation": turn or 0.0}
+    return typed(PalletIn, form, pose=pose if given else None)
 
 
 # --- what is wrong, where it was typed
@@ -220,34 +209,28 @@ def again(form: Mapping[str, str]) -> FormValues:
 
 def at_fields(error: InbandError, lines: list[str]) -> dict[str, str]:
     """Messages by the field of the form or the line of the grid."""
-    moved = []
-    for field, message in error.errors:
+
+    def at(field: str, message: str) -> tuple[str, str]:
         folder, _dot, rest = field.partition(".")
-        name, text = folder, message
-        at = re.fullmatch(r"(touches|side|holes)\[(\d+)\]", folder)
-        if at is not None:
-            number = int(at[2])
-            if at[1] == "touches":
-                name = lines[number] if number < len(lines) else "lines"
-                text = f"{field_words(rest)}: {message}" if rest else message
-            else:
-                name = f"{at[1]}{number + 1}"
-                text = f"{field_words(rest)}: {message}" if rest else message
-        elif folder == "characteristics":
-            name = f"as_{rest}"
-        elif folder.partition("[")[0] in {"base", "table", "pose", "leave_out"}:
-            name = folder.partition("[")[0]
-        if FieldError(name, text) not in moved:
-            moved.append(FieldError(name, text))
-    error.errors = moved
-    return by_field(error)
+        name, _bracket, index = folder.rstrip("]").partition("[")
+        if index and name in {"touches", "side", "holes"}:
+            number = int(index)
+            text = f"{field_words(rest)}: {message}" if rest else message
+            if name == "touches":
+                return lines[number] if number < len(lines) else "lines", text
+            return f"{name}{number + 1}", text
+        if name == "characteristics":
+            return f"as_{rest}", message
+        return name if name in {"base", "table", "pose", "leave_out"} else folder, message
+
+    return by_field(error, at)
 
 
 def field_words(field: str) -> str:
     """A part of a touch as the grid calls it.
 
-    >>> said("nominal[1]"), said("measured[0]")
-    ('Y', 'found X')
+    >>> field_words("nominal[1]"), field_words("measured[0]")
+    ('Y', 'measured X')
     """
     name, _bracket, index = field.rstrip("]").partition("[")
     axis = "XYZ"[int(index)] if index.isdigit() and int(index) < 3 else ""

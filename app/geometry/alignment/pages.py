@@ -13,7 +13,7 @@ from app.access.deps import Caller, Operator, Viewer, require
 from app.errors import Conflict, FieldError, InbandError, Invalid, NotFound
 from app.geometry.alignment import actions, form_reader, queries, wording
 from app.geometry.alignment.answers import alignment_out, program_of, stop_of
-from app.geometry.alignment.schemas import AlignmentIn, AlignmentRecomputeIn, PalletIn
+from app.geometry.alignment.schemas import AlignmentIn, AlignmentRecomputeIn
 from app.geometry.alignment.tables import Alignment
 from app.language.i18n import _
 from app.loop.machines import queries as machines
@@ -21,7 +21,7 @@ from app.loop.machines.queries import machine_named, machine_of
 from app.loop.machines.wording import texts_by_control
 from app.loop.readings import actions as readings
 from app.web.deps import FormDep, Number, SessionDep, Sought, Word
-from app.web.forms import parsed, whole
+from app.web.forms import parsed, typed, whole
 from app.web.paging import address, part_of
 from app.web.templates import page
 from app.web.warnings import WarningsAcknowledgeIn
@@ -191,7 +191,7 @@ def compose(request: Request, session: SessionDep, caller: Operator, form: FormD
     """Compose and keep; or show what is wrong."""
     try:
         with session.begin_nested():
-            created = actions.compose(session, parsed(PalletIn, form_reader.pallet(form)), caller)
+            created = actions.compose(session, form_reader.pallet(form), caller)
     except (Invalid, Conflict, NotFound) as error:
         return _pallet(request, session, form, error)
     return RedirectResponse(f"/alignments/{created.row.id}", 303)
@@ -253,9 +253,7 @@ def acknowledge(request: Request, session: SessionDep, caller: Operator, number:
     alignment = queries.alignment(session, number)
     try:
         with session.begin_nested():
-            actions.acknowledge(
-                session, alignment, parsed(WarningsAcknowledgeIn, {"reason": form.get("reason", "")}), caller
-            )
+            actions.acknowledge(session, alignment, typed(WarningsAcknowledgeIn, form), caller)
     except (Invalid, Conflict) as error:
         return _alignment(request, session, caller, alignment, unacknowledged=error)
     return RedirectResponse(f"/alignments/{number}", 303)
@@ -267,9 +265,7 @@ def recompute(request: Request, session: SessionDep, caller: Operator, number: i
     alignment = queries.alignment(session, number)
     try:
         with session.begin_nested():
-            recomputed = actions.recompute(
-                session, alignment, parsed(AlignmentRecomputeIn, form_reader.again(form)), caller
-            )
+            recomputed = actions.recompute(session, alignment, typed(AlignmentRecomputeIn, form), caller)
     except (Invalid, Conflict) as error:
         return _alignment(request, session, caller, alignment, form, error)
     return RedirectResponse(f"/alignments/{recomputed.id}", 303)

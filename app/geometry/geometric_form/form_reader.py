@@ -7,9 +7,9 @@ from typing import Any
 from app.core.number_text import has_broken_number
 from app.core.number_text import plain as plain_text
 from app.errors import Invalid
-from app.geometry.geometric_form.schemas import OF_POINTS, OF_SECTIONS, WITH_DATUM, WITH_LENGTH
+from app.geometry.geometric_form.schemas import OF_POINTS, OF_SECTIONS, WITH_DATUM, WITH_LENGTH, FormIn
 from app.language.i18n import _
-from app.web.forms import length, micrometres
+from app.web.forms import length, read
 
 HEAD = re.compile(
     r"^\s*(?:section\s*\d*)?\s*[,:;]?\s*(?:[Zz]\s*[=:]?\s*(?P<height>[-+−]?[\d.,]+)\s*)?(?:mm)?\s*:?\s*$", re.IGNORECASE
@@ -64,17 +64,11 @@ def _numbers(row: str, number: int, field: str) -> list[float]:
 def fields(form: Mapping[str, str]) -> dict[str, Any]:
     """The form as the API takes it. Raises `Invalid` for a line that is not a valid point."""
     kind = form.get("kind", "")
-    given: dict[str, Any] = {
-        name: form.get(name, "").strip()
-        for name in ("machine", "feature", "kind", "method", "side", "part", "characteristic")
-    }
-    given |= {"tip_diameter": length(form.get("tip_diameter"))}
-    if kind in WITH_LENGTH:
-        given["length"] = length(form.get("length"))
-    for name in ("tolerance", "repeatability"):  # typed in µm
-        given[name] = micrometres(form.get(name))
-    touched = _touched(form, "touches", in_points=_in_points(form, kind, "feature_as"))
-    given |= touched
+    given = read(FormIn, form) | {"datum": None, "nominal": None}
+    if kind not in WITH_LENGTH:
+        given["length"] = None
+    del given["sections"], given["points"]
+    given |= _touched(form, "touches", in_points=_in_points(form, kind, "feature_as"))
     if kind in WITH_DATUM and form.get("datum", "").strip():
         given["datum"] = _touched(form, "datum", in_points=_in_points(form, kind, "datum_as"))
     if kind == "position":

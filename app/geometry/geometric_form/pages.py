@@ -10,7 +10,7 @@ from starlette.responses import RedirectResponse
 
 from app.access.deps import Operator, Viewer, require
 from app.core.geometry.relations import ENGINE
-from app.errors import FieldError, InbandError, Invalid, NotFound
+from app.errors import InbandError, Invalid, NotFound
 from app.geometry.geometric_form import actions, form_reader, queries, wording
 from app.geometry.geometric_form.evaluation import warnings_of
 from app.geometry.geometric_form.schemas import FormIn
@@ -152,7 +152,7 @@ def _new(request: Request, session: Session, form: Mapping[str, Any], error: Inb
         "geometric_form/new.html",
         status=error.status if error else 200,
         form=form,
-        errors=_at_fields(error) if error else {},
+        errors=by_field(error, _shown_at) if error else {},
         error=error,
         shown=FIELDS,
         machines=machines(session),
@@ -160,17 +160,12 @@ def _new(request: Request, session: Session, form: Mapping[str, Any], error: Inb
     )
 
 
-def _at_fields(error: InbandError) -> dict[str, str]:
-    """Messages by the field of the form where the value was typed."""
-    moved = []
-    for field, message in error.errors:
-        folder, _dot, _rest = field.partition(".")
-        name = "datum" if folder == "datum" else folder.partition("[")[0]
-        where = field.removeprefix("datum.")
-        text = message if where == name or "Section" in message else f"{where}: {message}" if "[" in where else message
-        moved.append(FieldError(SHOWN_AT.get(name, name), text))
-    error.errors = moved
-    return by_field(error)
+def _shown_at(field: str, message: str) -> tuple[str, str]:
+    """The field of the form where the value was typed."""
+    name = "datum" if field.partition(".")[0] == "datum" else field.partition(".")[0].partition("[")[0]
+    where = field.removeprefix("datum.")
+    inner = "[" in where and "Section" not in message
+    return SHOWN_AT.get(name, name), f"{where}: {message}" if inner else message
 
 
 @router.post("/forms/new")

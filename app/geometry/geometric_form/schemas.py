@@ -9,7 +9,7 @@ from pydantic_core import PydanticCustomError
 from app.core.geometry.form import FormKind
 from app.core.parameters import LARGEST_LENGTH
 from app.language.i18n import _
-from app.web.fields import Body, LatelyOrNow, Length, RecordKey, Slug, Text200
+from app.web.fields import IN_UM, Body, LatelyOrNow, Length, RecordKey, Slug, Text200
 
 MOST_TOUCHES = 2000
 MOST_SECTIONS = 200
@@ -100,9 +100,11 @@ class FormIn(Body):
             description="For parallelism and perpendicularity: over which a tilt counts; else over the whole feature."
         ),
     ] = None
-    tolerance: Annotated[NotNegative | None, Field(description="Greatest deviation that is good.")] = None
+    tolerance: Annotated[NotNegative | None, IN_UM, Field(description="Greatest deviation that is good.")] = None
     repeatability: Annotated[
-        NotNegative | None, Field(le=1, description="Standard deviation of a single touch; without it no uncertainty.")
+        NotNegative | None,
+        IN_UM,
+        Field(le=1, description="Standard deviation of a single touch; without it no uncertainty."),
     ] = None
     tip_diameter: Annotated[
         NotNegative | None, Field(description="Of the probe's tip, if the touches are those of its centre.")

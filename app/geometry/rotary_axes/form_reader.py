@@ -8,16 +8,19 @@ from typing import Any, NamedTuple
 from app.core.number_text import has_broken_number
 from app.errors import FieldError, Invalid
 from app.files.formats.cell_values import Unreadable, moment, zone_named
+from app.geometry.rotary_axes.schemas import KinematicsPlanIn, RunIn
 from app.geometry.rotary_axes.tables import KinematicsPlan
 from app.language.i18n import _
 from app.language.times import plant_zone
-from app.web.forms import length
+from app.web.forms import by_field, length, read, typed
 
 NUMBERS = ("ball_radius", "max_modification", "max_modification_angle", "max_dev_cal_ball")
 WAYS = ("protocol", "pasted", "positions", "shift")
 COLUMNS = ("axis", "angle", "from", "x", "y", "z")
-TEXTS = ("program", "tool", "kinematics", "mode", "head")
-SETTINGS = ("ball_radius", "tip_radius", "clearance", "retract_height", "feed", "reference_angle", "backlash_angle")
+SETTINGS = (
+    *("machine", "program", "tool", "kinematics", "mode", "head", "ball_radius", "tip_radius", "clearance"),
+    *("retract_height", "feed", "reference_angle", "backlash_angle", "touches_per_ball"),
+)
 LINES, MOST_LINES, MOST_PASTED = 12, 120, 2_000
 FEWEST_TOUCHES = 4
 CHARSETS = {"windows-1250": "cp1250", "cp1250": "cp1250", "iso-8859-2": "iso8859-2", "latin2": "iso8859-2"}
@@ -55,11 +58,9 @@ def way(form: Mapping[str, str]) -> str:
 
 def run(form: Mapping[str, str]) -> dict[str, Any]:
     """The form of a run as the API's fields. Raises `Invalid` for what is missing, and for lines that are no position."""
-    values: dict[str, Any] = {"machine": form.get("machine"), "measured_at": _moment(form, "measured_at")}
-    values |= {name: form.get(name, "").strip() for name in TEXTS}
-    values |= {name: length(form.get(name)) for name in SETTINGS}
-    touches = form.get("touches_per_ball", "").strip()
-    values["touches_per_ball"] = int(touches) if touches.isascii() and touches.isdigit() else touches
+    values = read(RunIn, {name: form.get(name, "") for name in SETTINGS}) | {
+        "measured_at": _moment(form, "measured_at")
+    }
     match way(form):
         case "positions":
             values["axes"] = _axes(form)
@@ -77,9 +78,9 @@ def run(form: Mapping[str, str]) -> dict[str, Any]:
     return values
 
 
-def entry(form: Mapping[str, str], reason: str) -> dict[str, Any]:
-    """Fields of the API for the entry of a run on the control. Raises `Invalid` for what is no time."""
-    return {"reason": reason, "offsets": form.get("offsets") == "true", "at": _moment(form, "at")}
+def entry(form: Mapping[str, str]) -> dict[str, str]:
+    """The form of an act on a run, its time by the clock of the plant. Raises `Invalid` for what is no time."""
+    return {**form, "at": _moment(form, "at") or ""}
 
 
 def _moment(form: Mapping[str, str], field: str) -> str | None:
@@ -221,15 +222,10 @@ def shown_lines(form: Mapping[str, str]) -> int:
 # --- limits
 
 
-def plan(form: Mapping[str, str]) -> dict[str, Any]:
-    """The form of the limits as the API's fields. Raises `Invalid` that names the line."""
-    return {
-        **{name: length(form.get(name)) for name in NUMBERS},
-        "reference_head": form.get("reference_head", "").strip(),
-        "limits": {name: length(value) for name, value in _pairs(form, "limits")},
-        "characteristics": dict(_pairs(form, "characteristics")),
-        "reason": form.get("reason"),
-    }
+def plan(form: Mapping[str, str]) -> KinematicsPlanIn:
+    """The limits as typed. Raises `Invalid` that names the line."""
+    limits = {name: length(value) for name, value in _pairs(form, "limits")}
+    return typed(KinematicsPlanIn, form, limits=limits, characteristics=dict(_pairs(form, "characteristics")))
 
 
 def _pairs(form: Mapping[str, str], field: str) -> list[tuple[str, str]]:
@@ -260,17 +256,14 @@ def filled_in(plan: KinematicsPlan) -> dict[str, str]:
 
 def at_fields(error: Invalid, form: Mapping[str, str]) -> dict[str, str]:
     """Messages by the field of the form; those of a list belong to the list."""
-    messages: dict[str, str] = {}
-    for field, wrong in error.errors:
-        message = wrong
+
+    def at(field: str, message: str) -> tuple[str, str]:
         top = field.partition("[")[0].partition(".")[0]
         inner = "nominal" if "nominal" in field else "found"
         name = {"axes": "positions", "body": way(form), "results": "pasted", "shift": inner}.get(top, top)
         place = _POSITION.search(field)
-        if place is not None and name == "positions":
-            message = _("position {n}: {message}").format(n=int(place[1]) + 1, message=message)
-        sentence = message[:1].upper() + message[1:]
-        messages[name] = (
-            f"{messages[name]}. {sentence}" if name in messages and sentence not in messages[name] else sentence
-        )
-    return messages
+        if place is None or name != "positions":
+            return name, message
+        return name, _("position {n}: {message}").format(n=int(place[1]) + 1, message=message)
+
+    return by_field(error, at)

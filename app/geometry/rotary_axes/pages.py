@@ -7,25 +7,25 @@ from typing import Annotated, Any
 
 from fastapi import APIRouter, Query, Request, Response
 from markupsafe import Markup
-from sqlalchemy.orm import Session
 from starlette.responses import RedirectResponse
 
 from app.access.deps import Engineer, Operator, Viewer, require
 from app.charts import svg, to_drawing
-from app.errors import Conflict, Invalid
+from app.errors import Invalid
 from app.files.documents.content import Picture
 from app.files.documents.files import MEDIA_TYPES
-from app.geometry.rotary_axes import actions, confirmation, form_reader, queries, run_history
+from app.geometry.rotary_axes import actions, form_reader, queries, run_history, verbs
 from app.geometry.rotary_axes.protocol import protocol_of
-from app.geometry.rotary_axes.schemas import EnterIn, KinematicsPlanIn
+from app.geometry.rotary_axes.result_values import errors_of
+from app.geometry.rotary_axes.verbs import OfBackup, OfRun
 from app.geometry.rotary_axes.view import COMMON, ON_PAGE, machine_url, others_of, shown_machine, shown_run
 from app.language.i18n import _
 from app.loop.machines.queries import machine_named
 from app.web.deps import FormDep, Number, SessionDep, Word
 from app.web.fields import LARGEST_ID
-from app.web.forms import by_field, parsed, words
 from app.web.paging import address, part_of
 from app.web.templates import page
+from app.web.verb import Verb, ask, carry_out, named
 
 router = APIRouter(include_in_schema=False)
 
@@ -55,7 +55,7 @@ def machine_page(
     n: Number = None,
 ) -> Response:
     """The drift of a machine, its heads, its runs, its back-ups, its limits."""
-    message = confirmation.done(done, n) if done else None
+    message = verbs.done(done, n) if done else None
     return shown_machine(request, session, caller, machine, head=head, value=value, before=before, message=message)
 
 
@@ -65,7 +65,7 @@ def plan(request: Request, session: SessionDep, caller: Engineer, machine: str, 
     machine_row = machine_named(session, machine)
     try:
         with session.begin_nested():
-            actions.set_plan(session, machine_row, parsed(KinematicsPlanIn, form_reader.plan(form)), caller)
+            actions.set_plan(session, machine_row, form_reader.plan(form), caller)
     except Invalid as error:
         return shown_machine(request, session, caller, machine, form=form, error=error)
     return RedirectResponse(machine_url(machine_row.key, done="plan"), 303)
@@ -77,7 +77,7 @@ def plan(request: Request, session: SessionDep, caller: Engineer, machine: str, 
 @router.get("/kinematics/runs/{run}")
 def run_page(request: Request, session: SessionDep, caller: Viewer, run: int, done: Word = None) -> Response:
     """Result of a run: values to enter, diagrams, tables."""
-    message = confirmation.done(done, run) if done else None
+    message = verbs.done(done, run) if done else None
     return shown_run(request, session, caller, run, message=message)
 
 
@@ -152,90 +152,58 @@ def recompute(request: Request, session: SessionDep, caller: Operator, run: int)
 # --- the second touch
 
 
-@router.get("/kinematics/runs/{run}/{what}", dependencies=[require("operator")])
-def ask(request: Request, session: SessionDep, run: int, what: str) -> Response:
+def _verb(what: str, on: OfRun) -> Verb[OfRun, Any]:
+    return named(verbs.RUN, what, on, _("Go back to the rotary axes."))
+
+
+@router.get("/kinematics/runs/{run}/{what}")
+def ask_first(request: Request, session: SessionDep, caller: Operator, run: int, what: str) -> Response:
     """The second touch: `confirm` a large change, or it is to `enter`."""
-    return _ask_run(request, session, run, what)
+    on = OfRun(session, run, caller)
+    return _ask_run(request, _verb(what, on), on)
 
 
 def _ask_run(
     request: Request,
-    session: Session,
-    run: int,
-    what: str,
+    verb: Verb[OfRun, Any],
+    on: OfRun,
     form: Mapping[str, str] | None = None,
     error: Invalid | None = None,
 ) -> Response:
-    row = queries.run(session, run)
-    back = f"/kinematics/runs/{run}"
-    return _ask(request, row.machine, confirmation.about_run(row, what), f"{back}/{what}", back, form, error)
-
-
-def _ask(
-    request: Request,
-    machine: Any,
-    question: confirmation.Question,
-    here: str,
-    back: str,
-    form: Mapping[str, str] | None,
-    error: Invalid | None,
-) -> Response:
-    return page(
-        request,
-        "rotary_axes/ask.html",
-        status=error.status if error else 200,
-        machine=machine,
-        question=question,
-        here=here,
-        back=back,
-        form=form or {},
-        errors=by_field(error) if error else {},
-        **COMMON,
-    )
+    back, row = f"/kinematics/runs/{on.number}", on.row
+    question, entered = verb.question(on, f"{back}/{verb.name}"), verb.name == "enter"
+    offsets = entered and bool(errors_of(row.run.results)) and any((row.run.results["offsets"] or {}).values())
+    more = {"machine": row.machine, "back": back, "offsets": offsets, "when": entered}
+    return ask(request, "rotary_axes/ask.html", question, form, error, **more, **COMMON)
 
 
 @router.post("/kinematics/runs/{run}/{what}")
 def decide(request: Request, session: SessionDep, caller: Operator, run: int, what: str, form: FormDep) -> Response:
     """It is done, or who comes too late is told how it stands."""
+    on = OfRun(session, run, caller)
+    verb = _verb(what, on)
     try:
-        reason = confirmation.reason(words(form, "reason"))
-        if what == "confirm":
-            actions.confirm(session, run, reason, caller)
-        elif what == "undo":
-            caller.must("engineer")
-            actions.undo(session, run, reason, caller)
-        elif what == "enter":
-            body = parsed(EnterIn, form_reader.entry(form, reason))
-            actions.enter(session, run, reason, caller, offsets=body.offsets, at=body.at)
-        else:
-            raise confirmation.nothing_here()
-    except Conflict as late:
-        return shown_run(request, session, caller, run, message=f"{late.detail} {late.what_to_do or ''}", late=True)
+        outcome = carry_out(verb, on, form_reader.entry(form))
     except Invalid as error:
-        return _ask_run(request, session, run, what, form, error)
+        return _ask_run(request, verb, on, form, error)
+    if outcome.kind == "late":
+        return shown_run(request, session, caller, run, message=outcome.refused, late=True)
     return RedirectResponse(f"/kinematics/runs/{run}?done={what}", 303)
 
 
-@router.get("/kinematics/machines/{machine}/backups/{version}", dependencies=[require("engineer")])
-def ask_restore(request: Request, session: SessionDep, machine: str, version: int) -> Response:
+@router.get("/kinematics/machines/{machine}/backups/{version}")
+def ask_restore(request: Request, session: SessionDep, caller: Engineer, machine: str, version: int) -> Response:
     """The second touch before a kinematics is put back."""
-    return _ask_restore(request, session, machine, version)
+    return _ask_restore(request, OfBackup(session, machine_named(session, machine), version, caller))
 
 
 def _ask_restore(
-    request: Request,
-    session: Session,
-    machine: str,
-    version: int,
-    form: Mapping[str, str] | None = None,
-    error: Invalid | None = None,
+    request: Request, on: OfBackup, form: Mapping[str, str] | None = None, error: Invalid | None = None
 ) -> Response:
-    machine_row = machine_named(session, machine)
-    old = queries.backup(session, machine_row, version)
-    now = queries.in_effect(session, machine_row.id, old.head)
-    question = confirmation.about_backup(old, now, queries.version_of(session, machine_row.id, old.head))
-    back = machine_url(machine_row.key)
-    return _ask(request, machine_row, question, f"{back}/backups/{version}", back, form, error)
+    back = machine_url(on.machine.key)
+    question = verbs.RESTORE.question(on, f"{back}/backups/{on.number}")
+    more = {"machine": on.machine, "back": back, "offsets": False, "when": False}
+    return ask(request, "rotary_axes/ask.html", question, form, error, **more, **COMMON)
 
 
 @router.post("/kinematics/machines/{machine}/backups/{version}")
@@ -243,15 +211,12 @@ def restore(
     request: Request, session: SessionDep, caller: Engineer, machine: str, version: int, form: FormDep
 ) -> Response:
     """It is put back, as a new version."""
-    machine_row = machine_named(session, machine)
+    on = OfBackup(session, machine_named(session, machine), version, caller)
     try:
-        reason = confirmation.reason(words(form, "reason"))
-        backup = actions.restore(
-            session, machine_row, version, reason, caller, instead_of=confirmation.seen(form.get("seen"))
-        )
-    except Conflict as late:
-        message = f"{late.detail} {late.what_to_do or ''}"
-        return shown_machine(request, session, caller, machine, message=message, late=True)
+        outcome = carry_out(verbs.RESTORE, on, {**form, "instead_of": form.get("seen", "")})
     except Invalid as error:
-        return _ask_restore(request, session, machine, version, form, error)
-    return RedirectResponse(machine_url(machine_row.key, head=backup.head, done="restore", n=backup.version), 303)
+        return _ask_restore(request, on, form, error)
+    if outcome.kind == "late":
+        return shown_machine(request, session, caller, machine, message=outcome.refused, late=True)
+    backup = outcome.result
+    return RedirectResponse(machine_url(on.machine.key, head=backup.head, done="restore", n=backup.version), 303)

@@ -9,17 +9,15 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from app.core.number_text import has_broken_number
-from app.errors import FieldError, InbandError, Invalid
-from app.geometry.work_zero.schemas import MOST_TOUCHES, OTHER_NAMES, RECORDS
+from app.errors import InbandError, Invalid
+from app.geometry.work_zero.schemas import MOST_TOUCHES, OTHER_NAMES, RECORDS, FixtureIn, ZeroIn
 from app.language.i18n import _
-from app.web.forms import by_field, characteristics_typed, length, micrometres, whole, whole_numbers
+from app.web.forms import by_field, characteristics_typed, length, read, typed
 
 ROWS = 6
 SHOWN_ROWS = 4  # the others are opened where they are needed
 MOST_LETTERS = 20_000
 RESULTS = ("x", "y", "z", "diameter", "length", "width")
-WORDS = ("machine", "kind", "work_offset", "fixture", "part", "key")
-NUMBERS = ("tip", "z_touched", "feeler", "tool_length")
 SIGN = {"\N{MINUS SIGN}": "-", "\N{EN DASH}": "-"}
 
 # In which direction the tip goes, touch by touch, where nobody says otherwise.
@@ -58,11 +56,9 @@ def like(inputs: Mapping[str, Any], kind: str, /, **more: str | None) -> dict[st
 
 def fields(form: Mapping[str, str]) -> tuple[dict[str, Any], list[str]]:
     """The form as the API takes it, and by touch the field in which it was typed. Raises `Invalid` for a line that is none."""
-    values: dict[str, Any] = {name: form.get(name, "").strip() for name in WORDS}
-    values |= {name: length(form.get(name)) for name in NUMBERS}
-    values["repeatability"] = micrometres(form.get("repeatability"))
-    if named := characteristics_typed(form, RESULTS):
-        values["characteristics"] = named
+    values = read(ZeroIn, form)
+    del values["touches"], values["records"]
+    values["characteristics"] = characteristics_typed(form, RESULTS) or None
     touches: list[dict[str, Any]] = []
     typed_in: list[str] = []
     for at in range(1, ROWS + 1):
@@ -141,40 +137,24 @@ def _line(row: str, number: int) -> dict[str, Any]:
     )
 
 
-def watch(form: Mapping[str, str]) -> dict[str, Any]:
-    """The settings of a fixture as the API takes them; limits are typed in µm."""
-    values: dict[str, Any] = {"basis": form.get("basis", "").strip(), "reason": form.get("reason", "").strip()}
-    values["reference"] = whole(form.get("reference")) if values["basis"] == "frozen" else None
-    values |= {name: micrometres(form.get(name)) for name in ("warning", "alarm")}
-    return values | {"characteristics": characteristics_typed(form, RESULTS)}
-
-
-def again(form: Mapping[str, str]) -> dict[str, Any]:
-    """Computing once more, as the API takes it."""
-    tip, reason = length(form.get("tip")), form.get("reason", "").strip()
-    return {"tip": tip, "reason": reason, "leave_out": whole_numbers(form.get("leave_out"))}
+def watch(form: Mapping[str, str]) -> FixtureIn:
+    """The settings of a fixture as typed. Raises `Invalid`."""
+    more = {} if form.get("basis", "").strip() == "frozen" else {"reference": None}
+    return typed(FixtureIn, form, characteristics=characteristics_typed(form, RESULTS), **more)
 
 
 def at_fields(error: InbandError, typed_in: Sequence[str] = ()) -> dict[str, str]:
     """Messages by the field of the form."""
-    moved = []
-    for field, message in error.errors:
+
+    def at(field: str, message: str) -> tuple[str, str]:
         folder, _dot, rest = field.partition(".")
-        at = re.fullmatch(r"touches\[(\d+)\]", folder)
-        if at is not None:
-            number = int(at[1])
-            name = typed_in[number] if number < len(typed_in) else "lines"
-            message = f"{rest.upper()}: {message}" if rest and name != "lines" else message  # noqa: PLW2901 - moved
-        elif folder == "characteristics":
-            name = f"as_{rest}"
-        elif folder in {"records", *RECORDS}:
-            name = "lines"
-        elif folder.startswith("leave_out"):
-            name = "leave_out"
-        else:
-            name = folder
-        error_at_field = FieldError(name, message)
-        if error_at_field not in moved:
-            moved.append(error_at_field)
-    error.errors = moved
-    return by_field(error)
+        name, _bracket, index = folder.rstrip("]").partition("[")
+        if name == "touches" and index:
+            number = int(index)
+            line = typed_in[number] if number < len(typed_in) else "lines"
+            return line, f"{rest.upper()}: {message}" if rest and line != "lines" else message
+        if name == "characteristics":
+            return f"as_{rest}", message
+        return "lines" if folder in {"records", *RECORDS} else "leave_out" if name == "leave_out" else folder, message
+
+    return by_field(error, at)

@@ -14,14 +14,14 @@ from app.errors import Conflict, FieldError, InbandError, Invalid, NotFound
 from app.geometry.work_zero import actions, form_reader, pictures, queries, wording
 from app.geometry.work_zero.answers import program_of, stop_of, zero_out
 from app.geometry.work_zero.evaluation import touches_of
-from app.geometry.work_zero.schemas import FixtureIn, ZeroIn, ZeroRecomputeIn
+from app.geometry.work_zero.schemas import ZeroIn, ZeroRecomputeIn
 from app.geometry.work_zero.tables import WorkZero
 from app.loop.machines import queries as machines
 from app.loop.machines.queries import machine_named, machine_of
 from app.loop.machines.wording import texts_by_control
 from app.loop.readings import actions as readings
 from app.web.deps import FormDep, Number, SessionDep, Sought, Word
-from app.web.forms import parsed
+from app.web.forms import parsed, typed
 from app.web.paging import address, part_of
 from app.web.templates import page
 from app.web.warnings import WarningsAcknowledgeIn
@@ -197,9 +197,7 @@ def acknowledge(request: Request, session: SessionDep, caller: Operator, number:
     zero = queries.work_zero(session, number)
     try:
         with session.begin_nested():
-            actions.acknowledge(
-                session, zero, parsed(WarningsAcknowledgeIn, {"reason": form.get("reason", "")}), caller
-            )
+            actions.acknowledge(session, zero, typed(WarningsAcknowledgeIn, form), caller)
     except (Invalid, Conflict) as error:
         return _zero(request, session, caller, zero, unacknowledged=error)
     return RedirectResponse(f"/work-zeros/{number}", 303)
@@ -211,7 +209,7 @@ def recompute(request: Request, session: SessionDep, caller: Operator, number: i
     zero = queries.work_zero(session, number)
     try:
         with session.begin_nested():
-            recomputed = actions.recompute(session, zero, parsed(ZeroRecomputeIn, form_reader.again(form)), caller)
+            recomputed = actions.recompute(session, zero, typed(ZeroRecomputeIn, form), caller)
     except (Invalid, Conflict) as error:
         return _zero(request, session, caller, zero, form, error)
     return RedirectResponse(f"/work-zeros/{recomputed.id}", 303)
@@ -271,7 +269,7 @@ def watch(
     row = queries.fixture_of(session, machine, fixture)
     try:
         with session.begin_nested():
-            actions.set_fixture(session, row, parsed(FixtureIn, form_reader.watch(form)), caller)
+            actions.set_fixture(session, row, form_reader.watch(form), caller)
     except Invalid as error:
         return _fixture(request, session, caller, queries.fixture_of(session, machine, fixture), form=form, error=error)
     return RedirectResponse(f"/work-zeros/fixtures/{row.machine.key}/{row.key}", 303)

@@ -8,7 +8,7 @@ from pydantic_core import PydanticCustomError
 from app.core.parameters import LARGEST_LENGTH
 from app.language.i18n import _
 from app.web.again import Repeatability, TouchesAgainIn
-from app.web.fields import LARGEST_ID, Body, LatelyOrNow, Length, Reason, RecordKey, Slug, Text200
+from app.web.fields import IN_UM, LARGEST_ID, Body, LatelyOrNow, Length, Reason, RecordKey, Slug, Text200
 
 MOST_TOUCHES = 100
 Positive = Annotated[float, Field(strict=True, gt=0, le=LARGEST_LENGTH, allow_inf_nan=False)]
@@ -117,7 +117,9 @@ class FixtureIn(Body):
     reference: Annotated[
         int | None, Field(strict=True, ge=1, le=LARGEST_ID, description="The work zero that is frozen.")
     ] = None
-    warning: Annotated[Positive | None, Field(description="From a larger shift on, the page warns.")] = None
-    alarm: Annotated[Positive | None, Field(description="A larger shift raises the alarm *fixture shifted*.")] = None
+    warning: Annotated[Positive | None, IN_UM, Field(description="From a larger shift on, the page warns.")] = None
+    alarm: Annotated[
+        Positive | None, IN_UM, Field(description="A larger shift raises the alarm *fixture shifted*.")
+    ] = None
     characteristics: Characteristics = Field(default={})
     reason: Reason

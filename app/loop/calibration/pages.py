@@ -10,19 +10,22 @@ from starlette.responses import RedirectResponse
 
 from app.access.deps import Caller, Operator, Viewer, require
 from app.core.parameters import MOST_LOCATIONS
-from app.errors import Conflict, FieldError, Invalid, NotFound
-from app.loop.calibration import actions, confirmation, form_reader, pairs, places, queries, single, wording
+from app.errors import FieldError, Invalid, NotFound
+from app.language.i18n import _
+from app.loop.calibration import actions, form_reader, pairs, places, queries, single, verbs, wording
 from app.loop.calibration.answers import calibration_out
 from app.loop.calibration.queries import Place
-from app.loop.calibration.schemas import CalibrationPlanIn, GaugeIn, PairIn, RingIn
+from app.loop.calibration.schemas import CalibrationPlanIn, PairIn
+from app.loop.calibration.verbs import OfPlace
 from app.loop.characteristics import queries as characteristics
 from app.loop.machines import queries as machines
 from app.loop.machines.queries import machine_named
 from app.loop.warnings.wording import sentence
 from app.web import paging
 from app.web.deps import FormDep, Number, SessionDep, Sought, Word
-from app.web.forms import by_field, parsed, words
+from app.web.forms import typed
 from app.web.templates import page
+from app.web.verb import Verb, ask, carry_out, named
 
 router = APIRouter(include_in_schema=False)
 ON_PAGE = 25
@@ -89,8 +92,8 @@ def place_page(
     done: Word = None,
     n: Number = None,
 ) -> Response:
-    """One place: how it stands, its history, the pairs, and the form_reader."""
-    message = confirmation.done(done, n) if done else None
+    """One place: how it stands, its history, the pairs, and the forms."""
+    message = verbs.done(done, n) if done else None
     return _place(request, session, caller, machine, _of(memory, location), before=before, said=message)
 
 
@@ -188,17 +191,15 @@ def enter(
         with session.begin_nested():
             if verb == "plan":
                 caller.must("engineer")
-                actions.set_plan(session, machine_row, place, parsed(CalibrationPlanIn, form_reader.plan(form)), caller)
+                actions.set_plan(session, machine_row, place, typed(CalibrationPlanIn, form), caller)
             elif verb == "pairs" and place.memory == "average":
-                new_pairs = [parsed(PairIn, pair) for pair in form_reader.pairs(form)]
-                number = _add_pairs(session, machine_row, location, new_pairs, caller)
+                number = _add_pairs(session, machine_row, location, form_reader.pairs(form), caller)
             elif place.memory == "average":
-                number = actions.calibrate_gauge(
-                    session, machine_row, parsed(GaugeIn, form_reader.gauge(form, location)), caller
-                ).row.record.number
+                gauge = form_reader.gauge(form, location)
+                number = actions.calibrate_gauge(session, machine_row, gauge, caller).row.record.number
             else:
-                ringed = parsed(RingIn, form_reader.ring(form, location))
-                number = actions.calibrate_ring(session, machine_row, ringed, caller).row.record.number
+                ring = form_reader.ring(form, location)
+                number = actions.calibrate_ring(session, machine_row, ring, caller).row.record.number
     except Invalid as error:
         return _place(request, session, caller, machine, place, form=form, error=error)
     done = verb if verb in {"plan", "pairs"} else "calibrated"  # whatever else the form said
@@ -212,38 +213,37 @@ def _add_pairs(session: Session, machine: Any, location: int, given: list[PairIn
         raise Invalid(missing.detail, errors=[FieldError("lines", missing.detail)]) from None
 
 
-@router.get("/calibration/{machine}/{memory}/{location}/{what}/{number}", dependencies=[require("operator")])
-def ask(
-    request: Request, session: SessionDep, machine: str, memory: str, location: int, what: str, number: int
+@router.get("/calibration/{machine}/{memory}/{location}/{what}/{number}")
+def ask_first(
+    request: Request,
+    session: SessionDep,
+    caller: Operator,
+    machine: str,
+    memory: str,
+    location: int,
+    what: str,
+    number: int,
 ) -> Response:
     """The second touch: `accept` a calibration, accept the `suggestion` of the pairs, `exclude` a pair."""
-    return _ask(request, session, machine, _of(memory, location), what, number)
+    on = OfPlace(session, machine_named(session, machine), _of(memory, location), number, caller)
+    return _ask(request, _verb(what, on), on)
+
+
+def _verb(what: str, on: OfPlace) -> Verb[OfPlace, Any]:
+    return named(verbs.PLACE, what, on, wording.go_to_overview())
 
 
 def _ask(
     request: Request,
-    session: Session,
-    machine: str,
-    place: Place,
-    what: str,
-    number: int,
+    verb: Verb[OfPlace, Any],
+    on: OfPlace,
     form: Mapping[str, str] | None = None,
     error: Invalid | None = None,
 ) -> Response:
-    machine_row = machine_named(session, machine)
-    return page(
-        request,
-        "calibration/ask.html",
-        status=error.status if error else 200,
-        machine=machine_row,
-        place=place,
-        question=confirmation.question(session, machine_row, place, what, number),
-        form=form or {},
-        errors=by_field(error) if error else {},
-        wording=wording,
-        address=address,
-        here=f"{address(machine, place)}/{what}/{number}",
-    )
+    here = address(on.machine.key, on.place)
+    question = verb.question(on, f"{here}/{verb.name}/{on.number}")
+    trail = [(_("Calibration"), "/calibration"), (f"{on.machine.name}, {question.where}", here)]
+    return ask(request, "tools/ask.html", question, form, error, machine=on.machine, trail=trail, back=here)
 
 
 @router.post("/calibration/{machine}/{memory}/{location}/{what}/{number}")
@@ -259,22 +259,13 @@ def confirm(
     form: FormDep,
 ) -> Response:
     """It is done, or who comes too late is told how it stands."""
-    machine_row, place = machine_named(session, machine), _of(memory, location)
+    on = OfPlace(session, machine_named(session, machine), _of(memory, location), number, caller)
+    verb = _verb(what, on)
     try:
-        reason = confirmation.reason(words(form, "reason"))
-        if what == "accept":
-            actions.accept(session, machine_row, number, reason, caller)
-        elif what == "suggestion" and place.memory == "average":
-            seen = confirmation.seen(form.get("seen"))
-            number = pairs.accept_suggestion(session, machine_row, location, reason, caller, seen=seen).record.number
-        elif what == "exclude" and place.memory == "average":
-            pairs.exclude_pair(session, machine_row, location, number, reason, caller)
-        else:
-            raise NotFound(wording.no_such_page(), wording.go_to_overview())
-    except Conflict as late:
-        return _place(
-            request, session, caller, machine, place, said=f"{late.detail} {late.what_to_do or ''}", late=True
-        )
+        outcome = carry_out(verb, on, {**form, "empirical_value": form.get("seen", "")})
     except Invalid as error:
-        return _ask(request, session, machine, place, what, number, form, error)
-    return RedirectResponse(address(machine, place, done=what, n=number), 303)
+        return _ask(request, verb, on, form, error)
+    if outcome.kind == "late":
+        return _place(request, session, caller, machine, on.place, said=outcome.refused, late=True)
+    n = outcome.result.record.number if verb is verbs.SUGGESTION else number
+    return RedirectResponse(address(machine, on.place, done=what, n=n), 303)

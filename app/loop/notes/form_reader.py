@@ -11,7 +11,7 @@ from app.language.times import plant_zone
 from app.loop.notes import actions
 from app.loop.notes.queries import NoteRow
 from app.loop.notes.schemas import NoteIn
-from app.web.forms import parsed, whole
+from app.web.forms import typed
 
 
 def write_as_typed(session: Session, form: Mapping[str, str], caller: Caller) -> NoteRow:
@@ -19,11 +19,9 @@ def write_as_typed(session: Session, form: Mapping[str, str], caller: Caller) ->
 
     Sent twice, it is the same note. Raises what `actions.write_note` raises, and `Invalid` for the form.
     """
-    typed = form.get("at", "").strip()
+    time = form.get("at", "").strip()
     try:
-        at = cell_values.moment(typed, plant_zone(), fold=0) if typed else None
+        at = cell_values.moment(time, plant_zone(), fold=0) if time else None
     except cell_values.Unreadable as error:
         raise Invalid.at("at", str(error)) from None
-    fields = {name: form.get(name, "").strip() for name in ("machine", "characteristic", "key")}
-    said = parsed(NoteIn, {**fields, "sequence": whole(form.get("sequence")), "at": at, "text": form.get("text")})
-    return actions.write_note(session, said, caller).row
+    return actions.write_note(session, typed(NoteIn, form, at=at), caller).row

@@ -1,7 +1,7 @@
 """Pages: one tool of a machine – its edge, its life against the plan and against the edges before, and how its offset came about."""
 
 from collections.abc import Mapping
-from typing import Annotated, Any
+from typing import Annotated
 
 from fastapi import APIRouter, Query, Request, Response
 from sqlalchemy.orm import Session
@@ -17,7 +17,7 @@ from app.loop.tools.edge_schemas import ToolSettings
 from app.loop.tools.edges import describe_tool
 from app.loop.tools.lives_queries import lives
 from app.web.deps import FormDep, SessionDep
-from app.web.forms import by_field, length, parsed
+from app.web.forms import by_field, parsed, read
 from app.web.templates import page
 
 router = APIRouter(include_in_schema=False)
@@ -53,12 +53,7 @@ def describe(
 
 def parsed_settings(form: Mapping[str, str]) -> ToolSettings:
     """The form as the API takes it: every field is said, an empty one is taken away. Wear life is typed in µm."""
-    fields: dict[str, Any] = {name: form.get(name, "").strip() or None for name in FIELDS}
-    for name in ("planned_parts", "sister"):
-        if fields[name] is not None and fields[name].isdecimal() and len(fields[name]) < 12:
-            fields[name] = int(fields[name])
-    total = length(fields["planned_total"])
-    fields["planned_total"] = round(total / 1000, 9) if isinstance(total, float) else total
+    fields = {name: None if value == "" else value for name, value in read(ToolSettings, form).items()}
     parsed(ToolSettings, fields)
     return ToolSettings.model_validate(fields)
 

@@ -7,7 +7,7 @@ from pydantic import BaseModel, Field
 
 from app.core.parameters import LARGEST_LENGTH, MOST_LOCATIONS
 from app.loop.tools.lives_queries import Life, Lives
-from app.web.fields import Body, Reason, Text200, answer_from
+from app.web.fields import IN_UM, Body, Reason, Text200, answer_from
 
 
 class ToolSettings(Body):
@@ -22,6 +22,7 @@ class ToolSettings(Body):
     ] = None
     planned_total: Annotated[
         float | None,
+        IN_UM,
         Field(
             strict=True,
             ge=0.000001,

@@ -21,7 +21,7 @@ from app.web.deps import FormDep, Number, SessionDep, Word
 from app.web.forms import by_field
 from app.web.paging import address, part_of
 from app.web.templates import page
-from app.web.verb import Verb, carry_out, named
+from app.web.verb import Verb, ask, carry_out, named
 
 router = APIRouter(include_in_schema=False)
 MOST_IN_QUEUE = 50
@@ -204,20 +204,8 @@ def _ask(
     form: Mapping[str, str] | None = None,
     error: Invalid | None = None,
 ) -> Response:
-    machine = on.machine
+    machine, memory = on.machine, memory_address(on.machine.key)
     where = f"tools/{on.number}/{verb.name}" if isinstance(on, OfTool) else f"averages/{on.number}/edit"
-    return page(
-        request,
-        "tools/ask.html",
-        status=error.status if error else 200,
-        machine=machine,
-        question=verb.question(on, f"/machines/{machine.key}/{where}"),
-        form=form or {},
-        errors=by_field(error) if error else {},
-        trail=[
-            (_("Machines"), "/machines"),
-            (machine.name, f"/machines/{machine.key}"),
-            (_("Tool memory"), memory_address(machine.key)),
-        ],
-        back=memory_address(machine.key),
-    )
+    question = verb.question(on, f"/machines/{machine.key}/{where}")
+    trail = [(_("Machines"), "/machines"), (machine.name, f"/machines/{machine.key}"), (_("Tool memory"), memory)]
+    return ask(request, "tools/ask.html", question, form, error, machine=machine, trail=trail, back=memory)

@@ -272,12 +272,6 @@ def even(grid: Grid) -> Grid:
     return grid._replace(cells=[[f"{float(text):.{most}f}" if text else "" for text in line] for line in grid.cells])
 
 
-def settings_of(form: Mapping[str, str]) -> dict[str, Any]:
-    """The settings as the API's fields; what is no number is left for the schema to refuse."""
-    numbers = {name: length(form.get(name)) for name in ("reference", "tolerance", "resolution")}
-    return {name: form.get(name, "").strip() or None for name in SETTINGS} | numbers
-
-
 def typed_settings(settings: Mapping[str, Any]) -> dict[str, str]:
     """The settings as they would have been typed."""
     return {

@@ -19,12 +19,12 @@ from app.loop.warnings.wording import sentence
 from app.quality.gauge_studies import actions, form_reader, labels, queries, wording
 from app.quality.gauge_studies.form_reader import Grid
 from app.quality.gauge_studies.queries import Advice, StudyRow
-from app.quality.gauge_studies.schemas import CorrectionIn, StudyIn
+from app.quality.gauge_studies.schemas import CorrectionIn, SettingsIn, StudyIn
 from app.quality.gauge_studies.tables import KINDS
 from app.quality.proof import queries as proof
 from app.quality.proof import wording as proof_wording
 from app.web.deps import Before, FormDep, SessionDep, Sought
-from app.web.forms import by_field, parsed
+from app.web.forms import by_field, parsed, read
 from app.web.paging import address, part_of
 from app.web.templates import page
 
@@ -117,7 +117,7 @@ def send_new(request: Request, session: SessionDep, caller: Operator, form: Form
                 return _form(request, session, kind, *filled)
             fields = {"kind": kind, "rows": form_reader.rows_of(kind, form_reader.stored_grid(kind, typed))}
             named = {"machine": typed.get("machine"), "characteristic": typed.get("characteristic")}
-            study = parsed(StudyIn, form_reader.settings_of(typed) | named | fields)
+            study = parsed(StudyIn, read(SettingsIn, typed) | named | fields)
             machine = machines.machine_named(session, study.machine or "")
             source = _source(session, kind, typed, study)
             result = actions.add_study(session, machine, study, caller, source)
@@ -271,9 +271,7 @@ def send_correction(request: Request, session: SessionDep, caller: Engineer, num
                 "reason": typed.get("reason"),
                 "seen_revision": int(seen) if seen.isdecimal() and len(seen) < 10 else seen or None,
             }
-            actions.correct_study(
-                session, number, parsed(CorrectionIn, form_reader.settings_of(typed) | fields), caller
-            )
+            actions.correct_study(session, number, parsed(CorrectionIn, read(SettingsIn, typed) | fields), caller)
     except InbandError as error:
         if not error.errors:
             raise

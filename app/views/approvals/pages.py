@@ -17,10 +17,9 @@ from app.views.approvals import queries as queue
 from app.views.approvals.verbs import APPROVE_ALL, OfTool
 from app.views.characteristic.glance import band_picture
 from app.web.deps import FormDep, Number, SessionDep, Word
-from app.web.forms import by_field
 from app.web.paging import address
 from app.web.templates import page
-from app.web.verb import carry_out, said
+from app.web.verb import ask, carry_out, said
 
 router = APIRouter(include_in_schema=False)
 
@@ -86,14 +85,6 @@ def approve_all(
 
 
 def _ask(request: Request, on: OfTool, form: Mapping[str, str] | None = None, error: Invalid | None = None) -> Response:
-    return page(
-        request,
-        "tools/ask.html",
-        status=error.status if error else 200,
-        machine=on.machine,
-        question=APPROVE_ALL.question(on, f"/corrections/{on.machine.key}/tools/{on.number}"),
-        form=form or {},
-        errors=by_field(error) if error else {},
-        trail=[(_("Approvals"), "/corrections")],
-        back="/corrections",
-    )
+    question = APPROVE_ALL.question(on, f"/corrections/{on.machine.key}/tools/{on.number}")
+    more = {"machine": on.machine, "trail": [(_("Approvals"), "/corrections")], "back": "/corrections"}
+    return ask(request, "tools/ask.html", question, form, error, **more)
