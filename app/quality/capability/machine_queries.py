@@ -1,8 +1,7 @@
 """Machine performance of the newest run of parts that nothing was changed in. Never writes. Lengths in mm."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from datetime import datetime
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,7 +12,7 @@ from app.core.spc.machine_performance import RUN, MachinePerformance
 from app.core.spc.quoting import or_refused
 from app.core.spc.refusal import Floats, Refused
 from app.loop.summaries import queries as statistics
-from app.quality.capability.queries import Study, moment
+from app.quality.capability.queries import Singles, Study, moment
 from app.quality.control_charts.series_queries import read
 
 LOOKED_AT = 5000
@@ -32,20 +31,6 @@ class Run:
     result: MachinePerformance | Refused
 
 
-@dataclass(slots=True)
-class _Plan:
-    """Deviations as they are."""
-
-    factor: float
-    quantity: str = "deviation"
-    grouping: str | None = None
-    group_size: int | None = None
-    group_pause: float | None = None
-    first_sequence: int = 0
-    last_sequence: int = 0
-    excluded: list[Any] = field(default_factory=list)
-
-
 def newest_run(session: Session, study: Study, length: int = RUN) -> Run | Refused:
     """The newest run of so many parts between which no correction came into effect, no tool was changed and nothing was set.
 
@@ -53,7 +38,7 @@ def newest_run(session: Session, study: Study, length: int = RUN) -> Run | Refus
     """
     current = study.current
     window = statistics.window_of(session, current.characteristic, last=LOOKED_AT)
-    found = read(session, current, _Plan(current.parameters.factor), window)
+    found = read(session, current, Singles(current.parameters.factor, "deviation"), window)
     series, at = found.series, found.measured_at
     effects = statistics.history_of(session, current.characteristic, window, ("compensated", "parameters_version"))
     here = np.isin(effects["sequence"], series.sequence)

@@ -368,11 +368,11 @@ def _stability(
 
 
 @dataclass(slots=True)
-class _Rebuilt:
-    """Reading of the wear curve: single readings, none left out but those that are left out everywhere."""
+class Singles:
+    """Plan of a series of single readings: none left out but those that are left out everywhere."""
 
     factor: float
-    quantity: str = "without_corrections"
+    quantity: str
     grouping: str | None = None
     group_size: int | None = None
     group_pause: float | None = None
@@ -390,7 +390,7 @@ def _without(
     confidence: float,
 ) -> tuple[Uncompensated | Refused, int]:
     """The same readings with what was corrected taken out again, tool life by tool life."""
-    rebuilt = read_series(session, current, _Rebuilt(current.parameters.factor), window)
+    rebuilt = read_series(session, current, Singles(current.parameters.factor, "without_corrections"), window)
     series = rebuilt.series.only(np.isin(rebuilt.series.sequence, counted["sequence"]))
     controlled = counted["deviation"][np.isin(counted["sequence"], series.sequence)]
     result = or_refused(
@@ -404,7 +404,7 @@ def scatter_of_parts(session: Session, current: CurrentCharacteristic, last: int
     window = statistics.window_of(session, current.characteristic, last=last)
     if not window.count:
         return None, 0
-    series = read_series(session, current, _Rebuilt(current.parameters.factor), window).series
+    series = read_series(session, current, Singles(current.parameters.factor, "without_corrections"), window).series
     if len(series) < FEWEST_READINGS:
         return None, len(series)
     sigma = or_refused(lambda: uncompensated.scatter(series.values, series.begins))
