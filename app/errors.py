@@ -180,7 +180,7 @@ class DatabaseAway(InbandError):
 
     status = 503
     kind = "database-away"
-    title = "The database is away"
+    title = "The database is unreachable"
 
     def __init__(self, detail: str | None = None) -> None:
         super().__init__(

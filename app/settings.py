@@ -160,7 +160,7 @@ class Settings(BaseSettings):
     workers: int = Field(default=1, ge=1, le=32, description="Server processes; one is enough for most plants.")
     public_url: Annotated[str, AfterValidator(_origin)] | None = Field(
         default=None,
-        description="The address people type when a proxy stands before Inband; https makes cookies Secure.",
+        description="The address people type when a proxy is in front of Inband; https makes cookies Secure.",
     )
     allow_plain_http: bool = Field(
         default=False, description="Listen beyond this computer without https: passwords and keys travel readable."

@@ -52,7 +52,7 @@ class RoleKeyIn(Body):
 class MachineKeyIn(Body):
     """A key for one machine."""
 
-    name: Annotated[Text200, Field(description="What it is for, so that it can be told from others.")]
+    name: Annotated[Text200, Field(description="What it is for, which tells it apart from others.")]
 
 
 class KeyOut(BaseModel):

@@ -52,16 +52,16 @@ async def hear(unit: Unit, told: dict[str, Any] | None) -> None:
 async def _against(unit: Unit, told: dict[str, Any]) -> tuple[str, str] | None:
     machine, memory = unit.machine, told["tool_memory"]
     if told["state"] == "read":
-        return "cancelled", "The bridge was started anew during the touch test. Nothing was written."
+        return "cancelled", "The bridge was restarted during the touch test. Nothing was written."
     if told["state"] != "asked":  # a note of it would be in the store from which it was written
         return "failed", (
-            "The bridge was started anew, and its store knows nothing of this touch test. Look whether the control shows the"
+            "The bridge was restarted, and its store knows nothing of this touch test. Look whether the control shows the"
             " number of before; if not, set that by hand."
         )
     if not machine.touch_tests_by_page:
         return "failed", (
             "This bridge makes no touch tests by the page. Set touch_tests_by_page = true in"
-            f" [machine.{machine.key}] of its configuration and start it anew, or use the command."
+            f" [machine.{machine.key}] of its configuration and restart it, or use the command."
         )
     if reason := offset_change.against(unit.link, machine, memory):
         return "failed", reason

@@ -53,7 +53,7 @@ def look_who_answers(identity: str, wanted: str | None) -> None:
 def silence(seconds: float) -> str:
     """The sentence about a control that does not answer."""
     return (
-        f"The control has not answered for {seconds:g} s: is it on, do address and port lead to it, and does a firewall stand"
+        f"The control has not answered for {seconds:g} s: is it on, do address and port lead to it, and is there a firewall"
         " between?"
     )
 

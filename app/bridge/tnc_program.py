@@ -16,7 +16,7 @@ def correction_program(
 
     locations: by tool memory. stop: the sequence of a reading behind which the machine has to stop, once.
     """
-    lines = ["; Inband writes this program anew. Do not edit it."]
+    lines = ["; Inband rewrites this program. Do not edit it."]
     if stop is not None:
         lines += [
             f"FN 9: IF +QR5 EQU +{stop} GOTO LBL 8 ; stopped before",

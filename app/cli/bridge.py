@@ -292,7 +292,7 @@ def accept_counters(machine: MachineName, config: ConfigFile = PLANT) -> None:
 @bridge.command("quarantine")
 def quarantine(
     machine: MachineName,
-    send: Annotated[bool, typer.Option("--send", help="Send them again: the cause is mended.")] = False,
+    send: Annotated[bool, typer.Option("--send", help="Send them again: the cause is fixed.")] = False,
     drop: Annotated[bool, typer.Option("--drop", help="Delete them for ever.")] = False,
     key: Annotated[str | None, typer.Option(help="Only the reading with this key.")] = None,
     config: ConfigFile = PLANT,
@@ -346,7 +346,7 @@ def certificate(
         public, key, uri = write_pair(folder, host or gethostname())
     except FileExistsError as error:
         raise InbandError(
-            f"{error} is there already.", "Move it away first; controls have to trust a new certificate anew."
+            f"{error} is there already.", "Move it away first; controls have to trust a new certificate again."
         ) from error
     except OSError as error:
         raise InbandError(f"{folder} cannot be written: {error.strerror}.") from error

@@ -112,7 +112,7 @@ FirstLine = Annotated[
 ]
 LastLine = Annotated[
     int | None,
-    typer.Option(envvar="INBAND_LAST_LINE", min=2, help="Last line of readings: below stand means or sums."),
+    typer.Option(envvar="INBAND_LAST_LINE", min=2, help="Last line of readings: means or sums follow below."),
 ]
 Missing = Annotated[
     str,

@@ -305,7 +305,7 @@ def _rights(conditions: "Sequence[_Condition]", *, own: bool) -> bool:
             "docs/how-to/run-for-real.md, *A role that cannot alter facts*."
         )
     else:
-        _well("rights", "facts are protected by triggers; whoever may read the data folder could remove them")
+        _well("rights", "facts are protected by triggers; anyone who may read the data folder could remove them")
     return True
 
 

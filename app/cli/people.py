@@ -63,7 +63,7 @@ def add_key(
     ] = None,
     machine: Annotated[str | None, typer.Option(envvar="INBAND_MACHINE", help="A key for this machine.")] = None,
     name: Annotated[
-        str, typer.Option(envvar="INBAND_NAME", help="What it is for, so that it can be told from others.")
+        str, typer.Option(envvar="INBAND_NAME", help="What it is for, which tells it apart from others.")
     ] = "",
     data_dir: DataDir = None,
     database_url: DatabaseUrl = None,

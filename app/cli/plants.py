@@ -71,7 +71,7 @@ def add_plant(
                 )
     say(f"{added.name} is served at {of_plant.address}/ within some seconds, by every server of this database.")
     if token:
-        say("Whoever opens this link first becomes its administrator (it works once, for a week):")
+        say("The first person to open this link becomes its administrator (it works once, for a week):")
         say(f"  {of_plant.address}/invitation/{token}", style="bold")
 
 

@@ -227,7 +227,7 @@ def invite_administrator(database: "Database", settings: "Settings") -> None:
         if queries.active_admins(session):
             return
         token = actions.create_invitation(session, role="admin", actor="inband serve")
-    say("There is no administrator yet. Whoever opens this link first becomes one (it works once, for a week):")
+    say("There is no administrator yet. The first person to open this link becomes one (it works once, for a week):")
     say(f"  {settings.address}/invitation/{token}", style="bold")
 
 
@@ -261,7 +261,7 @@ def _serve(settings: "Settings", listening: socket.socket, finish: Callable[[], 
         workers = Multiprocess(config, [listening])
         workers.run()
         if any(process.exitcode == STARTUP_FAILURE for process in workers.processes):
-            raise InbandError("The server did not start; the reason stands above.")
+            raise InbandError("The server did not start; see the reason above.")
         return
     try:
         server.run(sockets=[listening])
@@ -274,7 +274,7 @@ def _serve(settings: "Settings", listening: socket.socket, finish: Callable[[], 
     finally:
         ending.done()
     if not server.started:
-        raise InbandError("The server did not start; the reason stands above.")
+        raise InbandError("The server did not start; see the reason above.")
 
 
 def _create_alone(ending: _Ending) -> "ASGIApp":

@@ -133,7 +133,7 @@ def missing(connection: psycopg.Connection[Any], schemas: Sequence[str]) -> list
         told.append("there is no other node. As a superuser: SELECT citus_add_node('HOST', PORT)")
     for host, port, answers, lacks in connection.execute(_SETTINGS):
         if not answers:
-            told.append(f"{Node(host, port)} does not answer, so its plants stand still; the others go on: {lacks}")
+            told.append(f"{Node(host, port)} does not answer, so its plants are stopped; the others go on: {lacks}")
         elif lacks:
             told.append(f"no plant can be moved from or to {Node(host, port)}: set {lacks} there, and start it again")
     here = [schema for schema in schemas if node_of(connection, schema) is None]

@@ -98,12 +98,12 @@ def advice_on(replication: Replication) -> list[str]:
         advice.append(
             "No standby is synchronous: one that is promoted may lack the readings that were answered last. "
             "synchronous_standby_names makes every commit wait until a standby has it: with two standbys, 'ANY 1 (a, b)' with "
-            "their names lets either of them be away."
+            "their names lets either of them be down."
         )
     elif synchronous and len([standby for standby in replication.standbys if standby.state == "streaming"]) == 1:
         advice.append(
-            "One standby is connected, and every commit waits for it: while it is away, whatever is to be stored is answered "
-            "503. With a second one, synchronous_standby_names 'ANY 1 (a, b)' with their names lets either of them be away."
+            "One standby is connected, and every commit waits for it: while it is unreachable, whatever is to be stored is answered "
+            "503. With a second one, synchronous_standby_names 'ANY 1 (a, b)' with their names lets either of them be down."
         )
     return advice
 

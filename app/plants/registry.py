@@ -62,7 +62,7 @@ def check(plant: Plant) -> None:
     if not KEY.fullmatch(plant.key):
         raise Invalid(
             f"{plant.key!r} cannot be the key of a plant.",
-            "Take up to 40 small letters, digits and hyphens, such as novi-sad: it stands in addresses.",
+            "Take up to 40 small letters, digits and hyphens, such as novi-sad: it is part of addresses.",
         )
     if plant.host is not None and not HOST.fullmatch(plant.host):
         raise Invalid(

@@ -29,7 +29,7 @@ Lock = Callable[[Session, Mapping[str, Any]], object]
 """Holds what is edited until the transaction ends, found by the parameters of the route."""
 TAGGED: dict[int | str, dict[str, Any]] = {
     200: {
-        "description": "As it stands",
+        "description": "As it is now",
         "headers": {
             "ETag": {
                 "schema": {"type": "string"},
@@ -87,9 +87,9 @@ def _refuse_changed(if_match: str, now: str) -> None:
     tags = [tag.strip().removeprefix("W/") for tag in if_match.split(",")]
     if "*" not in tags and now not in tags:
         raise ChangedMeanwhile(
-            _(
-                "It has changed since you looked: If-Match names another state than the one that stands now, {tag}."
-            ).format(tag=now),
+            _("It has changed since you looked: If-Match names another state than the current one, {tag}.").format(
+                tag=now
+            ),
             _("Get it again, look at what has changed, and repeat your change with the new ETag. Nothing was changed."),
         )
 

@@ -126,7 +126,7 @@ class Behind(Collector):
 
     def collect(self) -> Iterable[Metric]:
         behind = GaugeMetricFamily(
-            "inband_replica_behind_seconds", "Seconds that the replica lags; absent while it is away."
+            "inband_replica_behind_seconds", "Seconds that the replica lags; absent while it is unreachable."
         )
         if self._replica.behind is not None:
             behind.add_metric([], self._replica.behind)

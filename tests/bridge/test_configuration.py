@@ -114,7 +114,7 @@ def test_one_register_stands_for_one_tool_memory_and_one_key_for_one_machine() -
     place = GOOD[GOOD.index("[[machine") :]
     with pytest.raises(ConfigurationError, match="tool memory 3 has several locations"):
         read(GOOD + place)
-    with pytest.raises(ConfigurationError, match="stands for several tool memories"):
+    with pytest.raises(ConfigurationError, match="covers several tool memories"):
         read(GOOD + place.replace("tool_memory = 3", "tool_memory = 4"))
     with pytest.raises(ConfigurationError, match="have the same key for the server"):
         read(GOOD + GOOD[GOOD.index("[machine") :].replace("lathe-1", "lathe-2"))

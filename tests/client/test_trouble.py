@@ -30,7 +30,11 @@ DECISION = {
     "reason": {"code": "within_zero_range", "text": "within"},
     "of_a_newer_server": [1, 2],
 }
-AWAY = {"type": "urn:inband:problem:database-away", "title": "The database is away", "detail": "Nothing was stored."}
+AWAY = {
+    "type": "urn:inband:problem:database-away",
+    "title": "The database is unreachable",
+    "detail": "Nothing was stored.",
+}
 UNKNOWN = {"type": "urn:inband:problem:outcome-unknown", "title": "Unknown", "detail": "Nobody knows."}
 CUT = None
 Step = bytes | None | Callable[[], bytes]

@@ -266,7 +266,7 @@ class TestPlantOnANode:
             assert client.get("/characteristics/shaft").status_code == 503
             with psycopg.connect(coordinator) as connection:
                 (told,) = (each for each in citus.missing(connection, []) if "answer" in each)
-            assert told.startswith(f"{place_of_far} does not answer, so its plants stand still; the others go on")
+            assert told.startswith(f"{place_of_far} does not answer, so its plants are stopped; the others go on")
             with run_server(coordinator) as begun:  # it serves the others; the plant as soon as its node is there
                 near.base_url = httpx.URL(f"{begun.url}/p/near")
                 assert push(near, 3) == 3

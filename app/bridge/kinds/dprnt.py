@@ -125,7 +125,7 @@ class PrintedLink:
             return
         if epoch != before[0]:
             self._epochs = (
-                f"The control began to count anew: epoch {before[0]} became {epoch}. Were its variables lost?"
+                f"The control began to count again: epoch {before[0]} became {epoch}. Were its variables lost?"
             )
             self._highest = place
             return

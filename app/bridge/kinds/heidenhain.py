@@ -200,8 +200,8 @@ class Lsv2Files:
             return call()
         except TimeoutError as error:
             raise ControlAway(
-                f"{place} has not answered for {self.settings.answer:g} s while the bridge {what}: is the control on, and does"
-                " a firewall stand between?"
+                f"{place} has not answered for {self.settings.answer:g} s while the bridge {what}: is the control on, and is"
+                " there a firewall between?"
             ) from error
         except OSError as error:
             raise ControlAway(

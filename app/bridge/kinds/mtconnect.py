@@ -236,7 +236,7 @@ class Context:
         asked = datetime.now(UTC)
         answer = await self._ask(http, "sample", {"from": self._next, "count": COUNT})
         if answer.instance != self._instance:
-            self._note_gap("The agent was started anew")
+            self._note_gap("The agent was restarted")
             await self._begin(http, again=True)
             return True
         if answer.error.startswith("OUT_OF_RANGE"):

@@ -113,7 +113,7 @@ def _sinumerik_zero(zero: ZeroText) -> Iterator[str]:
     yield from _sinumerik_kept(zero.offset, WORK_ZERO, zero.number)
     if len(zero.axes) == 3:
         if zero.angle is None:
-            yield "; A ROTATION THAT STOOD THERE BECOMES 0."
+            yield "; A ROTATION SET THERE BECOMES 0."
         yield f"{frame}]={_ctrans(zero.axes)}" + (f":CROT(Z,{written(zero.angle)})" if zero.angle is not None else "")
     else:  # a whole frame would set what was not measured to 0
         yield "; WHAT IS NOT NAMED STAYS; A FINE OFFSET STAYS AND ADDS."

@@ -69,7 +69,7 @@ class SectionOut(BaseModel):
     warnings: list[str] = Field(description="What the numbers should not be read without.")
     facts: list[FactOut]
     table: ReportTableOut | None
-    charts: list[str] = Field(description="Which charts stand here on the page and in the PDF.")
+    charts: list[str] = Field(description="Charts shown here on the page and in the PDF.")
 
     @classmethod
     def of(cls, section: Section, report: Report) -> "SectionOut":
@@ -102,7 +102,7 @@ class ReportOut(BaseModel):
     period: str
     timezone: str
     made_at: datetime
-    warnings: list[str] = Field(description="What stands above everything else.")
+    warnings: list[str] = Field(description="Heading above everything else.")
     head: list[FactOut]
     sections: list[SectionOut]
 

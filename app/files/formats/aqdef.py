@@ -184,8 +184,8 @@ def no_field(line: str) -> str:
 def _several_files(key: str, value: str, before: str, line: int, of: str = "{name}") -> Unusable:
     return Unusable(
         _(
-            "{key} is {value} here and was {before} above, with values between: several files stand one after the other. "
-            "Part them."
+            "{key} is {value} here and was {before} above, with values between: this is several files, one after the other. "
+            "Split them."
         ).format(key=key, value=of.format(name=repr(value)), before=of.format(name=repr(before))),
         line,
     )

@@ -92,7 +92,7 @@ def values(source: Source, description: Description) -> Iterator[Value | Remark]
     except UnicodeError:
         raise Unusable(_("This is not {encoding} text.").format(encoding=encoding.upper())) from None
     if not line.endswith("\n") and reading.is_cut(number):
-        reason = _("is shorter than what stands above and has no end: the file is cut off here; take the whole one")
+        reason = _("is shorter than what is above it and has no end: the file is cut off here; take the whole one")
         yield Remark(number, "", line.replace(OF_FIELD, "|").replace(OF_CHARACTERISTIC, "||")[-40:], reason, wrong=True)
     yield from reading.end()
 
@@ -144,7 +144,7 @@ class _Reading:
         for at, above in self._ahead().items() if self._rows else ():
             field, text = next(iter(above.fields.items()))
             waiting.append(Remark(above.line, f"{field}/{at}", text[:40], "", wrong=True))
-        reason = _("stands above the first values and below the last ones: nobody can tell which it belongs to")
+        reason = _("is above the first values and below the last ones: it could belong to either")
         yield from (each._replace(reason=reason) for each in waiting)
         yield from self._all_open()
         for (index, count), (line, fields) in self._of_values.items():

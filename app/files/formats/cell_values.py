@@ -97,7 +97,7 @@ def _no_number(fault: NumberFault, decimal: str) -> str:
         NumberFault.THOUSANDS: _(
             "has separators of thousands, or a point and a comma; write it without a separator of thousands"
         ),
-        NumberFault.BLANK: _("has a blank inside; write it without, nobody can tell what stood there"),
+        NumberFault.BLANK: _("has a blank inside; write it without, what was there is unknown"),
         NumberFault.TOO_LARGE: _("is too large to be a number of this world"),
         NumberFault.NOT_A_NUMBER: _("is not a number; write it like 39{decimal}9981, without a unit").format(
             decimal=decimal

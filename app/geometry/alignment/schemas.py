@@ -150,7 +150,9 @@ class AlignmentIn(Body):
     repeatability: Repeatability | None = None
     work_offset: Annotated[
         str | None,
-        Field(max_length=20, description="With `base`: the text sets this work offset anew; else the program's frame."),
+        Field(
+            max_length=20, description="With `base`: the text sets this work offset again; else the program's frame."
+        ),
     ] = None
     base: Annotated[Vector | None, Field(description="X, Y, Z of that work offset while touching.")] = None
     table: Annotated[TableIn | None, Field(description="The turn about Z is taken by this table.")] = None

@@ -145,7 +145,7 @@ def recompute(session: Session, number: int, reason: str, caller: Caller) -> For
     audit(
         session,
         caller.name,
-        "form computed anew",
+        "form computed again",
         f"form/{before.machine}/{number}",
         {"engine": last.engine, "value": last.value, "verdict": last.verdict},
         {"engine": evaluated.engine, "value": evaluated.value, "verdict": evaluated.verdict},

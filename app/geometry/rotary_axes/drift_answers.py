@@ -20,7 +20,7 @@ class BackupOut(BaseModel):
 
     version: int
     head: str | None
-    at: Annotated[datetime, Field(description="When it was told.")]
+    at: Annotated[datetime, Field(description="When it was reported.")]
     since: Annotated[datetime, Field(description="Runs measured from then on were measured on it.")]
     by: str
     reason: str

@@ -79,7 +79,7 @@ class MeasuringPlanIn(Body):
     def _each_axis_once(self) -> Self:
         letters = [axis.axis for axis in self.axes]
         if len(set(letters)) != len(letters):
-            raise PydanticCustomError("twice", _("each axis may stand in a plan once"))
+            raise PydanticCustomError("twice", _("each axis may be in a plan once"))
         return self
 
     def plan(self) -> MeasuringPlan:

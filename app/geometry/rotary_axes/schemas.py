@@ -52,7 +52,7 @@ class AxisIn(Body):
     ball: Annotated[
         Point | None,
         Field(
-            description="Nominal centre of the ball at the angle 0, seen from where the axis should stand. If nobody says "
+            description="Nominal centre of the ball at the angle 0, seen from where the axis should be. If nobody says "
             "it, the mean of the centres turned back."
         ),
     ] = None
@@ -78,7 +78,7 @@ class AxisIn(Body):
     seen_from: Annotated[
         Literal["axis", "machine"],
         Field(
-            description="axis: centres, touches and ball count from where the axis should stand. machine: they are in the "
+            description="axis: centres, touches and ball count from where the axis should be. machine: they are in the "
             "same coordinates as `position`, which is needed then."
         ),
     ] = "axis"
@@ -168,7 +168,7 @@ class RunIn(Body):
         _one_of(self, ("axes", "shift", "results", "pasted", "protocol"))
         letters = [axis.axis for axis in self.axes or ()]
         if len(set(letters)) != len(letters):
-            raise PydanticCustomError("twice", _("each axis may stand in a run once"), {"at": "axes"})
+            raise PydanticCustomError("twice", _("each axis may be in a run once"), {"at": "axes"})
         return self
 
 

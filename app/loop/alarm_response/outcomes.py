@@ -51,7 +51,7 @@ def _followed(item: dict[str, Any]) -> str:
                 item["parts"],
             )
         case "offset_assumed":
-            text = _("Nobody has said with which offset: {offset} is assumed.")
+            text = _("No offset was entered; {offset} is assumed.")
         case "tool_changed_already":
             text = _("Tool {tool} had been changed since, so nothing was restarted a second time.")
         case "corrections_superseded":

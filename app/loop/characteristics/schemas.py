@@ -85,7 +85,7 @@ GivenParameters = Annotated[
     dict[str, Any],
     Field(
         description="The R parameters, by name or R number. R33 < R34 ≤ R35/2 ≤ R37 ≤ R36 must hold. "
-        "`target` with `tolerance_width` may stand in place of nominal and deviations.",
+        "`target` with `tolerance_width` may be given in place of nominal and deviations.",
         json_schema_extra=parameters_schema(given=True),
     ),
 ]

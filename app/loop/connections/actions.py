@@ -80,7 +80,7 @@ def take_heartbeat(
 def remove_connection(session: Session, machine: str, caller: Caller) -> None:
     """Forget the connection of a machine that has no bridge any more, and end its alarms.
 
-    Harmless if there is none. A bridge that still speaks makes it anew. Raises `NotFound`.
+    Harmless if there is none. A bridge that still reports creates it again. Raises `NotFound`.
     """
     owner = machine_named(session, machine)
     lock_machines(session, [owner.id])

@@ -16,7 +16,7 @@ ConnectionState = Literal[
 ]
 STATE_MEANS = (
     "`starting`: nothing is known of the control yet; `online`: it answers; `control_away`: it does not; `wrong_machine`: "
-    "another machine answers; `counters_lost`: the counters of its ring began anew; `full`: the bridge's store is full and "
+    "another machine answers; `counters_lost`: the counters of its ring began again; `full`: the bridge's store is full and "
     "nothing is fetched; `held`: it is on hold and writes nothing; `configuration`: the bridge cannot work as it is set up."
 )
 MOST_QUARANTINED = 20

@@ -35,7 +35,7 @@ def explained(name: str) -> str:
         "connection_starting": _("The bridge has started; nothing is known of the control yet."),
         "connection_control_away": _("The control does not answer the bridge."),
         "connection_wrong_machine": _("Another machine answers at the address: nothing is read nor written."),
-        "connection_counters_lost": _("The counters at the control began anew: somebody has to look at it."),
+        "connection_counters_lost": _("The counters at the control began again: it has to be checked."),
         "connection_full": _("The store of the bridge is full: readings wait in the control."),
         "connection_held": _("The bridge is on hold: no correction reaches the control."),
         "connection_configuration": _("The bridge cannot work as it is set up."),

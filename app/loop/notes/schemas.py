@@ -61,7 +61,7 @@ class WrittenNote(BaseModel):
     key: str | None
     written_at: datetime
     written_by: str
-    withdrawn: Annotated[WithdrawalOut | None, Field(description="null: it stands.")]
+    withdrawn: Annotated[WithdrawalOut | None, Field(description="null: it is in effect.")]
 
     @classmethod
     def of(cls, row: NoteRow) -> "WrittenNote":

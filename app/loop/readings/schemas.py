@@ -71,7 +71,7 @@ class ReadingIn(Struct, forbid_unknown_fields=True, gc=False):
         ]
         | None,
         Meta(
-            description="In place of measured: one list per point (R23), each with its repeats (R27). null stands for a "
+            description="In place of measured: one list per point (R23), each with its repeats (R27). null is a "
             "touch that is missing. A missing touch, or one outside ±a (R28), makes a probe fault of the reading: it is stored, "
             "raises the alarm, and the answer is `stop`. More points or repeats than there can be are refused."
         ),

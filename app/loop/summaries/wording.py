@@ -156,8 +156,8 @@ def refusal(refused: Refused) -> str:
             )
         case Reason.UNRESOLVED:
             return ngettext(
-                "The values are too coarse to tell of their scatter: %(num)d different value, or most of them the same. A finer resolution is needed.",
-                "The values are too coarse to tell of their scatter: %(num)d different values, or most of them the same. A finer resolution is needed.",
+                "The values are too coarse to show their scatter: %(num)d different value, or most of them the same. A finer resolution is needed.",
+                "The values are too coarse to show their scatter: %(num)d different values, or most of them the same. A finer resolution is needed.",
                 refused.have,
             ) % {"num": refused.have}
         case Reason.NOT_FINITE:

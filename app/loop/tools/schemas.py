@@ -165,7 +165,7 @@ class GainOut(BaseModel):
         float | None, Field(description="-1: wrong sign; 2 or 0.5: radius and diameter; null: not known yet.")
     ]
     uncertainty: Annotated[float | None, Field(description="Half the 95 % confidence interval.")]
-    corrections: Annotated[int | None, Field(description="Changes of the offset that it is told by.")]
+    corrections: Annotated[int | None, Field(description="Changes of the offset that show it.")]
     verdict: Annotated[
         Literal["opposite", "none", "weak", "strong"] | None,
         Field(description="Where it credibly lies outside 0.5 to 1.5; `none`: corrections change nothing."),

@@ -115,7 +115,7 @@ def suits(*, corrects: bool, wears: bool) -> Quantity:
 def why_it_suits(which: Quantity) -> str:
     """Reason for this characteristic."""
     return {
-        Quantity.DEVIATION: _("Nothing is corrected here, so the deviation tells of the process itself."),
+        Quantity.DEVIATION: _("Nothing is corrected here, so the deviation shows the process itself."),
         Quantity.WITHOUT_CORRECTIONS: _(
             "This characteristic is corrected. On the deviation as measured the loop itself would fire the rules: chart the process without corrections."
         ),

@@ -84,7 +84,7 @@ class HuntingOut(BaseModel):
     corrections: int
     reversals: int = Field(description="Corrections that took the one before back.")
     mean_size: float | None = Field(description="Mean size error that a correction removed.")
-    scatter: float = Field(description="Standard deviation of the process, told by successive differences.")
+    scatter: float = Field(description="Standard deviation of the process, from successive differences.")
     probability: float = Field(
         description="Of so many reversals where 1 reading in 10 is tolerable; alarm below 0.001."
     )

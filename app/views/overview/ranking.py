@@ -71,7 +71,7 @@ class AttentionInputs:
     def reasons(self) -> tuple[AttentionReason, ...]:
         """Reasons why it needs attention, the most urgent first; empty if it does not.
 
-        >>> AttentionInputs(State.IN_BAND, 0, 2, 0.9, None, False, 0.0).reasons
+        >>> AttentionInputs(CharacteristicState.IN_BAND, 0, 2, 0.9, None, False, 0.0).reasons
         (<AttentionReason.SIGNAL: 5>, <AttentionReason.NOT_CAPABLE: 6>)
         """
         ppk = inf if self.ppk is None else self.ppk
@@ -94,9 +94,9 @@ class AttentionInputs:
     def rank(self) -> tuple[float, ...]:
         """Smaller comes first: by the reasons in their order, then by Ppk and by the alarms per shift.
 
-        >>> calm = AttentionInputs(State.IN_BAND, 0, 0, 1.7, None, False, 0.0)
-        >>> near = AttentionInputs(State.IN_BAND, 0, 0, 1.9, 40.0, False, 0.0)
-        >>> worn = AttentionInputs(State.TOOL_WORN, 1, 0, 1.9, None, False, 0.3)
+        >>> calm = AttentionInputs(CharacteristicState.IN_BAND, 0, 0, 1.7, None, False, 0.0)
+        >>> near = AttentionInputs(CharacteristicState.IN_BAND, 0, 0, 1.9, 40.0, False, 0.0)
+        >>> worn = AttentionInputs(CharacteristicState.TOOL_WORN, 1, 0, 1.9, None, False, 0.3)
         >>> sorted([calm, near, worn], key=lambda each: each.rank) == [worn, near, calm]
         True
         """

@@ -35,7 +35,7 @@ class RankedOut(BaseModel):
     )
     low: float | None = Field(description="Its 95 % interval; null where it has none.")
     high: float | None = Field(description="Its 95 % interval; null where it has none.")
-    preliminary: bool = Field(description="Of too few readings to stand without its interval.")
+    preliminary: bool = Field(description="Of too few readings to be used without its interval.")
     method: str = Field(
         description="Distribution and scatter that the index was computed by; empty where there is none."
     )

@@ -351,7 +351,7 @@ def test_a_new_epoch_is_told() -> None:
         await taken(link)
         [received] = await taken(link)
         assert received.key == "lathe-1:9:1"
-        assert "The control began to count anew: epoch 7 became 9." in link.remark
+        assert "The control began to count again: epoch 7 became 9." in link.remark
 
     run(work())
 

@@ -14,7 +14,7 @@ def colour(text: str) -> Color:
     """A colour as style sheets write it.
 
     >>> colour("#ff0000").rgb(), colour("rgba(0,0,255,0.5)").alpha
-    ((1, 0, 0), 0.5)
+    ((1.0, 0.0, 0.0), 0.5)
     """
     if text.startswith("#"):
         number = text[1:] if len(text) == 7 else "".join(digit * 2 for digit in text[1:4])

@@ -111,7 +111,7 @@ class ReadingStore:
                 await self._roll_back()
                 self.connection.is_away()
                 if not await attempts.another():
-                    log.warning("readings could not be stored, the database is away: %s", error)
+                    log.warning("readings could not be stored, the database is unreachable: %s", error)
                     full = isinstance(error, psycopg.errors.DiskFull)
                     return [DiskFull() if full else DatabaseAway()] * len(readings)
             except InbandError:
@@ -250,5 +250,5 @@ def _busy(readings: Sequence[tuple[Entry, ReadingIn]]) -> Busy:
 def _unexpected() -> InbandError:
     return InbandError(
         _("This reading could not be stored because of a fault in the server. It was not stored."),
-        _("Keep the reading and tell whoever runs the server; its log names the fault."),
+        _("Keep the reading and inform the administrator of the server; its log names the fault."),
     )

@@ -294,7 +294,7 @@ def doubts(content: Content, parameters: Parameters) -> list[str]:
     texts = [sentence(each) for each in inch_warnings([("K2101", target, parameters.target)])]
     if content.unit == "inch" and looks_like_inches(parameters.target, target):
         texts.append(
-            _("{size} inch is {there} mm here: do the numbers of the file stand in mm already?").format(
+            _("{size} inch is {there} mm here: are the numbers of the file in mm already?").format(
                 size=f"{target / INCH:g}", there=f"{parameters.target:g}"
             )
         )

@@ -300,7 +300,7 @@ def test_inches_that_nobody_named_are_questioned(plant: Database, tmp_path: Path
     assert "looks like 39.992" in outcome.results[0].doubts[0]
     lines[3], lines[2] = "K2142/1 inch", "K2101/1 39.992"
     outcome = run(plant, written(tmp_path / "b.dfq", lines), dry_run=True)
-    assert "do the numbers of the file stand in mm already?" in outcome.results[0].doubts[0]
+    assert "are the numbers of the file in mm already?" in outcome.results[0].doubts[0]
 
 
 def test_limits_that_are_others_here_are_said(plant: Database, tmp_path: Path) -> None:
