@@ -1,18 +1,34 @@
-"""Style that no linter knows: lengths of `app/` that may only shrink, summaries that are no questions, width of templates.
+"""Style that no linter knows: lengths of `app/` that may only shrink, summaries that are no questions, width of templates,
+words.
 
 For `make lint`.
 """
 
 import ast
+import io
+import re
 import sys
+import tokenize
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 
 LONGEST_FUNCTION = 88  # lines, from `def` to the end, docstring included
 LONGEST_FILE = 519
 QUESTIONS = {"What", "Whether", "How", "Which", "Who", "Whose", "Where", "When", "Why"}
 WIDEST_TEMPLATE = 160  # columns
+NOT_SAID = re.compile(
+    r"\b(told(?![:(),]| IS| -)|mend(?:s|ed|ing)?|anew(?!:)|whoever|nobody has said|(?:is|are|was|were|be) away)\b",
+    re.IGNORECASE,
+)
+"""Say reported, found or informed; fix; again; the user or anyone who; not entered; unreachable."""
+CODE = re.compile(
+    r"``.*?``|`[^`]*`|\]\([^)]*\)|^ *>>>.*$|\b(?:SELECT|UPDATE|INSERT|CREATE TABLE|DELETE FROM)\b.*",
+    re.DOTALL | re.MULTILINE,
+)
+SENTENCE = re.compile(r"_\(\"(.*?)\"", re.DOTALL)
 APP = Path(__file__).resolve().parents[1] / "app"
 TEMPLATES = APP.parent / "frontend" / "templates"
+DOCS = APP.parent / "docs"
 
 
 def main() -> int:
@@ -46,6 +62,9 @@ def main() -> int:
                         f"{place}: a summary is no question ({words[0]} …): name the thing, or say what it does.\n"
                     )
                     status = 1
+    for place, word in sorted(words_not_said(files)):
+        sys.stderr.write(f"{place}: “{word}” is not said here; see NOT_SAID in tests/style.py.\n")
+        status = 1
     for template in TEMPLATES.rglob("*.html"):
         for number, line in enumerate(template.read_text(encoding="utf-8").splitlines(), 1):
             if len(line) > WIDEST_TEMPLATE:
@@ -55,6 +74,29 @@ def main() -> int:
                 )
                 status = 1
     return status
+
+
+def words_not_said(files: dict[Path, str]) -> Iterator[tuple[str, str]]:
+    """Words that are not ours in sentences, docstrings, comments and documents, each with its place."""
+    for path, text in files.items():
+        tokens = tokenize.generate_tokens(io.StringIO(text).readline)
+        texts = [
+            (token.start[0], token.string)
+            for token in tokens
+            if token.type == tokenize.COMMENT or (token.type == tokenize.STRING and " " in token.string)
+        ]
+        yield from _found(path, texts)
+    for path in TEMPLATES.rglob("*.html"):
+        text = path.read_text(encoding="utf-8")
+        yield from _found(path, [(text.count("\n", 0, at.start()) + 1, at[1]) for at in SENTENCE.finditer(text)])
+    for path in (*DOCS.rglob("*.md"), *DOCS.parent.glob("*.md")):
+        yield from _found(path, [(1, re.sub(r"```.*?```", "", path.read_text(encoding="utf-8"), flags=re.DOTALL))])
+
+
+def _found(path: Path, texts: Iterable[tuple[int, str]]) -> Iterator[tuple[str, str]]:
+    for number, text in texts:
+        for word in NOT_SAID.findall(CODE.sub("", text)):
+            yield f"{path.relative_to(APP.parent)}:{number}", word
 
 
 if __name__ == "__main__":

@@ -36,7 +36,7 @@ __all__ = [
 
 INVITATION_LASTS = timedelta(days=7)
 GUESSES = 5
-"""Wrong present passwords after which a session ends: whoever has stolen it must not find the password out by it."""
+"""Wrong present passwords after which a session ends: anyone who has stolen it must not find the password out by it."""
 
 
 class SessionEnded(NotSignedIn):

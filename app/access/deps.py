@@ -55,14 +55,14 @@ async def get_caller(request: Request) -> Caller:
 
 
 def _remember(request: Request, caller: Caller) -> None:
-    """Keep for the frame of the page to whom it is shown, whoever that is."""
+    """Keep for the frame of the page to whom it is shown, no matter who."""
     request.state.person = caller
     if caller.csrf:
         request.state.csrf = masked(caller.csrf)
 
 
 async def recognise(request: Request) -> None:
-    """Look up who is signed in, if that can be told, for a page without a caller of its own ("there is nothing here")."""
+    """Look up who is signed in, if that can be found out, for a page without a caller of its own ("there is nothing here")."""
     if getattr(request.state, "person", None) is not None:
         return
     with suppress(SQLAlchemyError):
@@ -148,7 +148,7 @@ class AtStation(NamedTuple):
 
 
 async def get_at_station(request: Request, machine: str) -> AtStation:
-    """Return the device of this machine, or whoever is signed in. A device is nobody: no other route knows its cookie.
+    """Return the device of this machine, or the user who is signed in. A device is nobody: no other route knows its cookie.
 
     Raises what `get_caller` raises; `NotSignedIn` for a device that is not bound any more, `NotAllowed` for that of another
     machine.

@@ -1,6 +1,6 @@
 """Devices bound to machines: a tablet that shows the station of one machine for as long as it is used.
 
-An administrator makes a one-time code; who types it on the device binds it. The device itself may do nothing but look: whoever
+An administrator makes a one-time code; who types it on the device binds it. The device itself may do nothing but look: anyone who
 acts there identifies themselves for that one action (`app.access.identification`).
 """
 

@@ -33,7 +33,7 @@ async def events(
     """Server-sent events: reading, correction, alarm, tool, signal, work_zero and what else changes; `heartbeat` while all is quiet.
 
     Each carries what changed (machine, characteristic, numbers); look the thing itself up. Of many readings of one
-    characteristic within a tenth of a second the last one is told. `resync` means: more was missed than is kept.
+    characteristic within a tenth of a second the last one is reported. `resync` means: more was missed than is kept.
     The stream ends when the key is revoked, the session ends, or the role of its owner changes.
     """
     if caller.only_machine is None:

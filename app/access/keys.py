@@ -90,7 +90,7 @@ class KeyRing:
     async def lookup(self, secret: str) -> Caller | None:
         """Return the caller with this secret; None if it is not known (any more).
 
-        Raises the driver's OperationalError when the database is away and the key has not called within a second.
+        Raises the driver's OperationalError when the database is unreachable and the key has not called within a second.
         """
         secret_hash = digest(secret)
         known = self._known.get(secret_hash)
@@ -121,7 +121,7 @@ class KeyRing:
         if self._renewing.get(secret_hash) is task:
             del self._renewing[secret_hash]
         if not task.cancelled():
-            task.exception()  # seen: whoever waits for it gets it; a renewal ahead of time just failed quietly
+            task.exception()  # seen: anyone who waits for it gets it; a renewal ahead of time just failed quietly
 
     async def _ask(self, secret_hash: bytes, generation: int) -> Caller | None:
         since = time.monotonic()

@@ -24,7 +24,7 @@ def list_keys(session: SessionDep, after: SerialAfter = 0, limit: Limit = 100) -
 
 @router.post("/keys", status_code=201)
 def make_key(session: SessionDep, caller: Admin, key: RoleKeyIn) -> NewKeyOut:
-    """A key for a program, with a person's role. The secret is told this once."""
+    """A key for a program, with a person's role. The secret is shown only this once."""
     new_key = actions.add_key(session, name=key.name, role=key.role, actor=caller.name)
     return NewKeyOut(id=new_key.id, name=key.name, secret=new_key.secret, role=key.role)
 

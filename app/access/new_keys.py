@@ -19,7 +19,7 @@ PREFIX = "inband_"
 
 
 class NewKey(NamedTuple):
-    """A key just made; the secret is told this once."""
+    """A key just made; the secret is shown only this once."""
 
     id: int
     secret: str

@@ -1,4 +1,4 @@
-"""Callers, told from the head of a request alone: by key, by the browser's session, or by the device. Asked once a request."""
+"""Callers, recognised from the head of a request alone: by key, by the browser's session, or by the device. Asked once a request."""
 
 from collections.abc import Callable
 from typing import TypeVar, cast
@@ -90,7 +90,7 @@ async def _look_up(request: Request) -> Caller:
 async def browser_of(request: Request) -> SignedIn | None:
     """Return the person who is signed in in this browser, and the numbers of the navigation; None for nobody.
 
-    Asked where it is written: no copy of the database may let in whoever was signed out or disabled just now.
+    Asked where it is written: no copy of the database may let in a user who was signed out or disabled just now.
     """
     token = request.cookies.get(SESSION_COOKIE)
     if token is None:

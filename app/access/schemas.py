@@ -36,7 +36,7 @@ class InvitationIn(Body):
 
 
 class InvitationOut(BaseModel):
-    """A one-time link, told this once; it works for seven days."""
+    """A one-time link, shown only this once; it works for seven days."""
 
     role: Role
     url: str
@@ -69,7 +69,7 @@ class KeyOut(BaseModel):
 
 
 class NewKeyOut(BaseModel):
-    """A key just made. The secret is told this once and stored nowhere."""
+    """A key just made. The secret is shown only this once and stored nowhere."""
 
     id: int
     name: str

@@ -98,7 +98,7 @@ def _person(session: Session, name: str) -> Person | None:
 
 
 def _place(address: str) -> str:
-    """The address as it is counted: of IPv6 the network, because whoever has one address there has them all."""
+    """The address as it is counted: of IPv6 the network, because anyone who has one address there has them all."""
     try:
         parsed = ip_address(address)
     except ValueError:

@@ -144,7 +144,7 @@ class Configuration(Struct, frozen=True):
 
 
 def read_configuration(path: Path) -> Configuration:
-    """The configuration in a file. Relative files stand beside it.
+    """The configuration in a file. Relative files are beside it.
 
     Raises `ConfigurationError` with every mistake.
     """
@@ -208,7 +208,7 @@ def _machine(key: str, table: dict[str, Any], folder: Path, problems: list[str])
             problems.append(f"{place}: {error}")
         else:
             settings = _converted(table.pop(kind, {}), module.Settings, f"{place}.{kind}", problems)
-            if hasattr(settings, "beside"):  # a kind with files of its own, which stand beside the configuration
+            if hasattr(settings, "beside"):  # a kind with files of its own, which are beside the configuration
                 settings = settings.beside(folder, f"{place}.{kind}", problems)
     secret = _secret(table, place, folder, problems)
     machine = _converted(table | {"key": key, "secret": secret or "", "settings": settings}, Machine, place, problems)

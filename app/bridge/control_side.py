@@ -26,7 +26,7 @@ from app.bridge.unit import Unit
 log = logging.getLogger(__name__)
 FIRST_PAUSE, LONGEST_PAUSE = 0.5, 15.0  # s between attempts to connect
 FULL_EVERY = 5.0  # s
-AGAIN = 15.0  # s between attempts at what stands beside the readings, at most
+AGAIN = 15.0  # s between attempts at what is beside the readings, at most
 T = TypeVar("T")
 
 
@@ -118,7 +118,7 @@ async def _closed(unit: Unit) -> None:
 
 
 async def _decide(unit: Unit, beside: Beside) -> None:
-    """Tell the control what was decided; whatever fails is told again."""
+    """Tell the control what was decided; whatever fails is reported again."""
     decided = tuple(unit.decisions)
     if not decided:
         return
@@ -149,7 +149,7 @@ async def _connected(unit: Unit, beside: Beside) -> None:
             await guided_test.advance(unit)
         if time.monotonic() >= full_at:
             full, full_at = await store.is_full(), time.monotonic() + FULL_EVERY
-            await unit.look_if_held()  # the server's side does not come to it while the server is away
+            await unit.look_if_held()  # the server's side does not come to it while the server is unreachable
         if full:
             if machine.corrections != "none" and not unit.offered:  # a hold and an age count all the same
                 async with asyncio.timeout(machine.patience):
@@ -186,7 +186,7 @@ async def _connected(unit: Unit, beside: Beside) -> None:
                         unit.to_tell = True
                         unit.news.set()
                     answered.add(outcome.number)
-                # nor another order for this location, however long the server is away: it begins at the offset of before
+                # nor another order for this location, however long the server is unreachable: it begins at the offset of before
                 unit.taken.add(memory or 0)
                 unit.orders = tuple(each for each in unit.orders if each.tool_memory != memory)
         offered = tuple(unit.offered)

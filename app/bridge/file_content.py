@@ -2,7 +2,7 @@
 
 A file is taken whole or not at all: one line that cannot be read is a `Fault`, and a person puts the file right. Each reading has
 a key for ever. It is a hash of the file up to its line and of its own fields: the same file delivered again, or one that
-has grown since, brings nothing twice. Readings without time, part and key of their own are told apart by the file's name and
+has grown since, brings nothing twice. Readings without time, part and key of their own are distinguished by the file's name and
 its time of modification too.
 """
 
@@ -49,7 +49,7 @@ class Settings(Struct, forbid_unknown_fields=True, frozen=True):
     ``measured`` holds for the lines below. decimal, delimiter, encoding: of the text; the last two are found out if they are
     left out. times: the form of times, as strptime has it. zone: of times without an offset. day_first: in dates
     with strokes, AQDEF only. missing: marks in place of a size that was not measured. others: readings of a characteristic that has no name in ``characteristics`` make the file fail,
-    or are passed over. decisions: an absolute path, of a file that says `stop` or `hold`; whoever acts on it removes it.
+    or are passed over. decisions: an absolute path, of a file that says `stop` or `hold`; anyone who acts on it removes it.
     """
 
     path: str

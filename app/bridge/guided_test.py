@@ -3,7 +3,7 @@
 The heartbeat's answer tells of one that is open (`hear`). The control's task owns the link and does each step between two polls
 (`advance`): it reads, writes when a person has said that the screen shows the same and the program is stopped, and takes back.
 Another task tells the server and hears the answers (`run`). Whatever happens the offset is taken back: after the answers, when
-a person stops it, when nobody answers, when the server is away, when the program ends, and after a crash at the next start.
+a person stops it, when nobody answers, when the server is unreachable, when the program ends, and after a crash at the next start.
 """
 
 import asyncio

@@ -122,7 +122,7 @@ class Outcome:
 
 
 STOPPING: frozenset[str] = frozenset({"hold", "stop"})
-"""Actions that a control must hear of, however often the bridge is started anew."""
+"""Actions that a control must hear of, however often the bridge is restarted."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -144,7 +144,7 @@ class Clock:
 
 
 class Link(Protocol):
-    """One control. Calls come one at a time; a call that fails raises `LinkError`, and the link is connected anew."""
+    """One control. Calls come one at a time; a call that fails raises `LinkError`, and the link is connected again."""
 
     clock: Clock
 

@@ -1,4 +1,4 @@
-"""Lines of the bridge's log: one for each reading, decision, correction offered and answered. What they say in words stands in
+"""Lines of the bridge's log: one for each reading, decision, correction offered and answered. What they say in words is in
 fields too, for programs that collect them (``--log-format json``).
 """
 

@@ -20,7 +20,7 @@ from inband_client import AsyncClient, Conflict, Correction, Invalid, NotFound, 
 log = logging.getLogger(__name__)
 REFUSED = (Conflict, Invalid, NotFound, TooLarge)
 MOST_REASON, MOST_NAME = 500, 200  # characters
-NOTICED = 0.0005  # mm: what an offset may differ by without being told
+NOTICED = 0.0005  # mm: what an offset may differ by without being reported
 
 
 async def tell(unit: Unit, client: AsyncClient) -> None:
@@ -62,7 +62,7 @@ async def _tell_one(unit: Unit, client: AsyncClient, intent: Intent) -> None:
         except (
             Conflict,
             NotFound,
-        ) as error:  # superseded while the control took it, told before, or forgotten by a restored server
+        ) as error:  # superseded while the control took it, reported before, or forgotten by a restored server
             if not_from_inband(error):
                 raise
             said = "is in the offset" if outcome.applied else "was refused by the control"
@@ -198,7 +198,7 @@ def _answered_before(told: Sequence[Intent], correction: Correction) -> Intent |
 
 async def _tell_again(unit: Unit, client: AsyncClient, correction: Correction, earlier: Intent) -> None:
     """A correction waits whose answer the server has heard: the answer was lost when the server went back in time, or the
-    control has refused it, or the number was given anew to another correction.
+    control has refused it, or the number was given again to another correction.
     """
     order, after = earlier.order, correction.offset_expected
     same = correction.tool_memory == order.tool_memory

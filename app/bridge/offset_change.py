@@ -167,7 +167,7 @@ async def take_back(link: Link, machine: Machine, change: Change) -> Back:
 
 
 def _near(held: float, wanted: float, machine: Machine, change: Change) -> bool:
-    """Before and after are told apart whatever the tolerance is."""
+    """Before and after are distinguished whatever the tolerance is."""
     return abs(held - wanted) <= min(machine.tolerance, abs(change.after - change.before) / 4)
 
 

@@ -15,7 +15,7 @@ class NotPlain(OSError):
 
 
 def is_plain(path: Path) -> bool:
-    """Tell if a regular file stands at a path itself. Raises `OSError` where there is nothing."""
+    """Tell if a regular file is at a path itself. Raises `OSError` where there is nothing."""
     return stat.S_ISREG(path.lstat().st_mode)
 
 
@@ -32,7 +32,7 @@ def read_plain(path: Path) -> tuple[bytes, os.stat_result]:
 
 
 def write_new(path: Path, content: bytes) -> None:
-    """Make a file that holds this; one that stands there already, or a link, is taken away first. Raises `OSError`."""
+    """Make a file that holds this; one that is there already, or a link, is taken away first. Raises `OSError`."""
     path.unlink(missing_ok=True)
     with path.open("xb") as file:
         file.write(content)

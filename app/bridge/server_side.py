@@ -61,7 +61,7 @@ async def run(unit: Unit, client: AsyncClient, server: Server) -> None:
                 pause, ask_at = max(pause, waits), 0.0
                 if away := isinstance(error, AWAY):
                     break
-        if due and trouble is None:  # corrections that readings ask for do not put off what else has to be told
+        if due and trouble is None:  # corrections that readings ask for do not put off what else has to be reported
             ask_at = time.monotonic() + server.ask
         unit.complain(trouble)
         if away:

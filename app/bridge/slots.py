@@ -67,7 +67,7 @@ def _body(machine: Machine, slot: Slot, unit: str) -> dict[str, object]:
         body["part"] = str(slot.part)
     if slot.status == Status.FIRST_MOVE:
         body["first_move_triggered"] = True
-    if slot.status == Status.NO_TRIGGER:  # what stands there as a size is none; the server makes a probe fault of it
+    if slot.status == Status.NO_TRIGGER:  # what is there as a size is none; the server makes a probe fault of it
         del body["measured"]
         body["touches"] = []
     return body

@@ -299,7 +299,7 @@ class Listener(Source[L]):
 class Following(Source[L]):
     """A file that grows.
 
-    One that shrinks, is replaced or written anew is read from its beginning: keys keep readings from coming twice.
+    One that shrinks, is replaced or rewritten is read from its beginning: keys keep readings from coming twice.
     """
 
     def __init__(self, file: str, lines: Callable[[], Reader[L]]) -> None:
@@ -307,7 +307,7 @@ class Following(Source[L]):
         self._lines = lines()
         self._at = 0
         self._known: int | None = None
-        self._before = b""  # what stands in front of `_at`
+        self._before = b""  # what is in front of `_at`
 
     async def open(self) -> str:
         """Look whether it is there."""
@@ -327,7 +327,7 @@ class Following(Source[L]):
                 about = os.fstat(file.fileno())
                 file.seek(self._at - len(self._before))
                 same = about.st_size >= self._at and self._known in {None, about.st_ino}
-                # a file that was written anew has other lines there: each has its own number
+                # a file that was rewritten has other lines there: each has its own number
                 if not same or file.read(len(self._before)) != self._before:
                     self._at, self._before = 0, b""
                     self._lines = self._reader()

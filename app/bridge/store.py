@@ -256,7 +256,7 @@ class Store:
         """Note an order before the control hears of it; whether it may: not when the control has answered it.
 
         One that was withdrawn may be offered again, and one that is open may be about something else by now: by another
-        mapping, or at a server that gives the number anew.
+        mapping, or at a server that gives the number again.
         """
 
         def write(database: sqlite3.Connection) -> bool:
@@ -382,13 +382,13 @@ class Store:
         )
 
     async def untold(self, machine: str, least: float) -> dict[int, float]:
-        """Offsets whose last reading differs by more than ``least`` from what the server was told, without those on which a
+        """Offsets whose last reading differs by more than ``least`` from what the server knows, without those on which a
         correction is open.
         """
         rows = await self._run(
             lambda database: database.execute(
                 "SELECT tool_memory, held FROM location WHERE machine = ? AND held IS NOT NULL"
-                " AND (told IS NULL OR abs(held - told) > ?) AND tool_memory NOT IN"
+                " AND (told IS NULL OR abs(told - held) > ?) AND tool_memory NOT IN"
                 " (SELECT tool_memory FROM intent WHERE machine = ? AND state IN ('open', 'answered'))",
                 (machine, least, machine),
             ).fetchall()
@@ -475,7 +475,7 @@ class Store:
         """Do these in one transaction; if it fails, each by itself, so that one cannot take the others along."""
         try:
             results = self._transaction([job for job, _ in jobs])
-        except Exception as error:  # noqa: BLE001 - handed to whoever waits for it
+        except Exception as error:  # noqa: BLE001 - handed to the one who waits for it
             if len(jobs) == 1:
                 _settle(jobs[0][1], error=in_words(error, self.file))
                 return

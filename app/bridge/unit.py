@@ -31,7 +31,7 @@ class Guided:
     """A touch test that a person guides at the page.
 
     number: at the server, None for one of the command that was cut off. heard: its state at the server; since: when it began at
-    the latest, by the bridge's own clock, for a server may be away and its clock may be set.
+    the latest, by the bridge's own clock, for a server may be unreachable and its clock may be set.
     refused: the question that was answered with no. reached: the state that the bridge has brought it to; told: the one of these
     that the server knows. change: once it is read. changed: the control may hold its offset. waits: why that is not
     taken back yet, where the control itself answers. ending: the state and the words

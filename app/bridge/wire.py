@@ -151,7 +151,7 @@ class _Connection(asyncio.Protocol):
             self.close()
 
     def connection_lost(self, error: Exception | None) -> None:
-        """Let whoever waits know."""
+        """Inform those who wait."""
         self.usable = False
         if error is not None:
             self._failed(httpx.ReadError(str(error)))

@@ -75,7 +75,7 @@ class Spread:
 class Series:
     """Points: joined by a pen, marked by dots, labelled; with the colour `fill` down to the series before.
 
-    meta: what it is, for tests and scripts. name: its words in the legend; without it stands there not. hover: words when
+    meta: what it is, for tests and scripts. name: its words in the legend; without it is there not. hover: words when
     pointed at, one for each point, or one for all with Plotly's `%{y:+.1f}`. links: what a click opens, for each point.
     """
 
@@ -114,7 +114,7 @@ class Bars:
 class Rule:
     """A line across the panel at `y`, or up through all panels at `x`, and its words: beside the panel, or on the line.
 
-    Words of a line upward stand above it. raised: of the words, pixels. upto: share of the height that a line upward takes.
+    Words of a line upward are above it. raised: of the words, pixels. upto: share of the height that a line upward takes.
     front: before what is drawn, not behind it.
     """
 

@@ -270,7 +270,7 @@ def resume(
 
 @bridge.command("accept-counters")
 def accept_counters(machine: MachineName, config: ConfigFile = PLANT) -> None:
-    """Begin anew with the counters that the control has now, after a person has looked why they went back.
+    """Begin again with the counters that the control has now, after a person has looked why they went back.
 
     Readings that the bridge has stored stay stored; those that come get keys of their own.
     """

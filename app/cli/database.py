@@ -172,7 +172,7 @@ def check(data_dir: DataDir = None, database_url: DatabaseUrl = None) -> None:
 
 
 def _replica(settings: "Settings") -> bool:
-    """Say how the replica is that charts and reports read, if one is named. True if it is away."""
+    """Say how the replica is that charts and reports read, if one is named. True if it is unreachable."""
     from sqlalchemy.exc import OperationalError
 
     from app.db.connections import Connections

@@ -25,7 +25,7 @@ class Role(StrEnum):
 
 
 def actor() -> str:
-    """Whoever runs the command, for the record of changes."""
+    """The user who runs the command, for the record of changes."""
     return f"command line ({getpass.getuser()})"
 
 

@@ -95,7 +95,7 @@ def run(
     prepare: "Callable[[Database, Settings], None] | None" = None,
     beside: "Callable[[Settings], None] | None" = None,
 ) -> None:
-    """Serve until told to end. ``prepare`` runs when the database is migrated, ``beside`` in a thread once we answer."""
+    """Serve until asked to end. ``prepare`` runs when the database is migrated, ``beside`` in a thread once we answer."""
     logs.configure(settings.log_level, settings.log_format)
     signal.signal(signal.SIGTERM, _end)  # from the first moment on, so that the database is always ended in order
     from app.db.connections import in_schema
@@ -171,7 +171,7 @@ def _log_start(database: "Database", settings: "Settings") -> None:
 
 
 class _Ending:
-    """The end of a process whose application may not come to its own: whoever is first ends the rest."""
+    """The end of a process whose application may not come to its own: anyone who is first ends the rest."""
 
     def __init__(self, finish: Callable[[], None]) -> None:
         self._finish = finish

@@ -2,10 +2,10 @@
 
 Compiled code is kept beside the source (``__pycache__``), where that cannot be written in the user's cache folder, or where
 ``NUMBA_CACHE_DIR`` says, which the server sets to a folder of its data (app.cli.serve); where nothing can be written it is
-compiled anew by each process. The first call of a process takes some milliseconds from the cache, and some seconds the very
+compiled again by each process. The first call of a process takes some milliseconds from the cache, and some seconds the very
 first time.
 
-A compiled function may call functions of ours in any file: they are compiled into it, and stay plain for whoever else calls
+A compiled function may call functions of ours in any file: they are compiled into it, and stay plain for anyone else who calls
 them. What is kept is renewed when one of those files changes, so constants are taken from them and from no other file (a
 test holds that). The interpreter's lock is let go while the code runs, so a page of a million readings holds nobody up:
 never give it an array that another thread writes.

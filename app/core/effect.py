@@ -16,7 +16,7 @@ misses of D is e times what it misses of -S / f, and scatter: a weighted least-s
 readings before i, so what is missed of it owes nothing to the scatter of i: the loop being closed does no harm.
 
 The variances of the steps are those of the greatest likelihood on a grid. Readings further off than `OUTLIER` standard deviations are
-taken as missing (a chip under the stylus); after three of them in a row the course begins anew (an edge that broke).
+taken as missing (a chip under the stylus); after three of them in a row the course begins again (an edge that broke).
 
 A local line is not quite what a machine does that warms up each morning. On simulated plants whose corrections act in full
 it was off by up to 6 %, whatever the number of readings: `MODEL` is part of the interval. Lengths are mm.
@@ -54,7 +54,7 @@ CREDIBLE = 0.9999  # of confidence, two-sided, for a verdict on the gain
 class Effect(NamedTuple):
     """The share of a correction that arrives, with its confidence interval.
 
-    corrections: changes of the offset that it is told by, among so many readings; typical: the median change of size that they
+    corrections: changes of the offset that it is found by, among so many readings; typical: the median change of size that they
     commanded, mm. scatter: standard deviation of a part about the course of the process, mm.
     """
 

@@ -131,7 +131,7 @@ def fit_of(text: str) -> Fit | None:
 
 
 def with_fit(given: Mapping[str, Any]) -> dict[str, Any]:
-    """Parameters with a tolerance class that stands in the nominal size (R42) written as numbers.
+    """Parameters with a tolerance class that is in the nominal size (R42) written as numbers.
 
     Deviations (R40, R41) that are said beside it stay: then the class is left as it is, for the refusal to name it.
     """

@@ -16,7 +16,7 @@ over the parts since the first of the two; over those of one correction alone it
 median step from part to part over that of a normal distribution, so wear from part to part is in it, and a chip or an edge that
 breaks is not. The limits below are those with which simulated tool lives are never paused (docs/reference/gain.md).
 
-A gain over many corrections, while the machine warms up, is told by `app.core.effect`. Lengths are mm.
+A gain over many corrections, while the machine warms up, is found by `app.core.effect`. Lengths are mm.
 """
 
 from math import sqrt

@@ -4,7 +4,7 @@ A correction that answers to scatter moves a process that was right, and the nex
 parts scatter more than with no loop at all (Deming's funnel, rule 2; Grubbs 1954 and MacGregor 1988 on over-adjustment). The mark of hunting
 are corrections that take the one before back. Wear asks for corrections of one sign.
 
-**What scatter alone causes** (`corrections_by_scatter`) is worked out for the rules as they stand (`app.core.decision.decide`), not by rules
+**What scatter alone causes** (`corrections_by_scatter`) is worked out for the rules as they are (`app.core.decision.decide`), not by rules
 of thumb. Readings are decided on the deviation with every correction issued so far counted in, so the pipeline drops out::
 
     y = mu + e,    e normal with the scatter's standard deviation,

@@ -89,7 +89,7 @@ _BROKEN = re.compile(r"\d\.[^\S\n]+\d", re.ASCII)
 
 
 def has_broken_number(row: str) -> bool:
-    """Tell of a row of numbers in which a blank stands behind a decimal point, so that one number would be read as two.
+    """Tell of a row of numbers in which a blank is behind a decimal point, so that one number would be read as two.
 
     >>> has_broken_number("-X -353. 012"), has_broken_number("12.5 3.0"), has_broken_number("1, 2")
     (True, False, False)

@@ -1,7 +1,7 @@
 """The parameters of a characteristic: one complete set, its order, and L75 (domain §2).
 
 `read` turns what a person or a program sent into `Parameters`, or into the complete list of `Problem`; the table of the
-fields stands in `parameter_table`. Lengths are mm.
+fields is in `parameter_table`. Lengths are mm.
 """
 
 from collections.abc import Iterator, Mapping

@@ -1,6 +1,6 @@
 """Periods of time, half-open: the end is where the next one begins, so no reading belongs to two of them, and none to neither.
 
-The border stands here for moments and columns of moments; `app.db.period` says the same to PostgreSQL.
+The border is here for moments and columns of moments; `app.db.period` says the same to PostgreSQL.
 """
 
 from datetime import UTC, datetime, timedelta

@@ -70,10 +70,10 @@ def in_order(parameters: Parameters) -> bool:
 
 
 def best_region(cells: Sequence[Figures | None], criterion: Criterion, today: Figures | None = None) -> Region:
-    """The best cell, and those that cannot be told from it: no worse by two standard errors of the best, or by 5 %.
+    """The best cell, and those that cannot be distinguished from it: no worse by two standard errors of the best, or by 5 %.
 
     Standard errors: of a count its root; of s, s / sqrt(2 n); of Ppk, Bissell's (1990, Appl. Stat. 39, 331). Cells share the
-    same parts, so they are told apart better than that: the region is rather too wide. `today`: where the fewest corrections
+    same parts, so they are distinguished better than that: the region is rather too wide. `today`: where the fewest corrections
     are looked for, cells that reject more or have a worse Ppk than today's are no choice: those are of a loop that sleeps.
     """
     bound = today if criterion is Criterion.CORRECTIONS else None

@@ -8,7 +8,7 @@ in front of the padding, and ends lines as its parameters say: only start word a
 
 The check sum is the remainder by 97 of a weighted sum of the remainders. It finds every single wrong digit, and any two that
 changed places. It cannot find a number that became exactly ten times as large, or a tenth, where 97 divides it. So the form
-counts too: one blank stands in front of each letter and of the end mark, and a size has 4 decimals in mm, 5 in inch; a blank that
+counts too: one blank is in front of each letter and of the end mark, and a size has 4 decimals in mm, 5 in inch; a blank that
 became 0, a 0 that became a blank, or a point that moved breaks it. One of a hundred lines that are wrong in several places, or
 have lost a digit, may pass.
 """

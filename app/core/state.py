@@ -1,4 +1,4 @@
-"""In which state a characteristic is, told by its data alone. Pure."""
+"""In which state a characteristic is, found by its data alone. Pure."""
 
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass

@@ -142,7 +142,7 @@ def joined(sequence: NDArray[np.int64], curve: Values, steps: Sequence[Step]) ->
 
 
 def scatter_of(curve: Values) -> float:
-    """The standard deviation of the scatter alone, told by successive differences, so that wear and drift do not count.
+    """The standard deviation of the scatter alone, found by successive differences, so that wear and drift do not count.
 
     Mean moving range / d2 (d2 = 1.128, ISO 7870-2), ranges beyond four times the mean left out: a step is no scatter.
 

@@ -2,7 +2,7 @@
 
 A database can fall silent without a word: its process is stopped, its host is gone, a firewall swallows the packets. So
 one thread asks it for a trifle at short intervals. As long as that is answered, a statement may take the time that
-the server's own limits give it. When it is not answered within the patience, the database counts as silent: whoever waits on
+the server's own limits give it. When it is not answered within the patience, the database counts as silent: anyone who waits on
 a connection gets an `OperationalError` within a tenth of a second, and nobody waits for a new connection until the
 database has been heard again. The same befalls connections to a server that another one has replaced.
 
@@ -261,7 +261,7 @@ class WatchedConnection(_Watched, psycopg.Connection[Any]):
         return super().wait(self._guarded(gen), interval, timeout)
 
     def commit(self) -> None:
-        """Commit; only a standby that is away keeps that longer than the patience, and nobody shall wait for it here."""
+        """Commit; only a standby that is unreachable keeps that longer than the patience, and nobody shall wait for it here."""
         if self.connections is None:
             super().commit()
             return
@@ -277,7 +277,7 @@ class WatchedAsyncConnection(_Watched, AsyncConnection[Any]):
     """A connection for an event loop."""
 
     async def wait(self, gen: PQGen[RV], interval: float = LOOK, timeout: float | None = None) -> RV:  # noqa: ASYNC109 - psycopg's own signature
-        """Wait as psycopg does, as long as the database is heard. Whoever is cancelled closes the connection."""
+        """Wait as psycopg does, as long as the database is heard. Anyone who is cancelled closes the connection."""
         try:
             return await waiting.wait_async(self._guarded(gen), self.pgconn.socket, interval=interval, timeout=timeout)
         except asyncio.CancelledError:

@@ -9,7 +9,7 @@ In the data directory::
     postgres.log   what it says       users.lock    held (shared) by everyone who uses the server
     run/           its socket
 
-Several processes may use one data directory: the first starts the server, the last one out stops it. Whoever is killed
+Several processes may use one data directory: the first starts the server, the last one out stops it. Anyone who is killed
 leaves no trace but perhaps a running server, which the next one uses. The server listens on no network, only on a unix
 socket that its owner alone may enter, and therefore asks for no password.
 
@@ -123,7 +123,7 @@ class EmbeddedServer:
                 log.exception("the embedded PostgreSQL cannot be watched for now")
 
     def _trim_log(self) -> None:
-        """Begin a long log anew and keep the old one beside it, also while the server runs: it may do so for years."""
+        """Begin a long log again and keep the old one beside it, also while the server runs: it may do so for years."""
         if not self.log.exists() or self.log.stat().st_size <= MOST_LOG:
             return
         older = os.open(self.log.with_suffix(".log.1"), os.O_WRONLY | os.O_CREAT | os.O_TRUNC, 0o600)
@@ -185,7 +185,7 @@ class EmbeddedServer:
                 else f"{error} Or set INBAND_DATABASE_URL to a PostgreSQL server of your own."
             ) from None
         except BaseException:
-            if not used_before:  # whoever goes on using it keeps the lock: the next one out would stop the server
+            if not used_before:  # anyone who goes on using it keeps the lock: the next one out would stop the server
                 self._leave()
             raise
         return self.url

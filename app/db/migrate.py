@@ -104,7 +104,7 @@ def _loss(script: Script) -> str:
 
 @contextmanager
 def _alone(url: str) -> Iterator[Connection]:
-    """A connection that migrates while no other does; the lock ends with it. What people can mend is said in words."""
+    """A connection that migrates while no other does; the lock ends with it. What people can fix is said in words."""
     from sqlalchemy import text
     from sqlalchemy.exc import DBAPIError, OperationalError
 

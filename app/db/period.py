@@ -1,4 +1,4 @@
-"""The border of a period, as PostgreSQL reads it: from its start on, and before its end. What a period is stands in the core."""
+"""The border of a period, as PostgreSQL reads it: from its start on, and before its end. What a period is is in the core."""
 
 from datetime import datetime
 from typing import Any

@@ -1,7 +1,7 @@
 """A copy of the database that heavy reading is done on, so that it does not disturb the server that is written to.
 
 Nothing is written on it. It lags behind, so how far it has got is looked at each second, and what somebody must see – their
-own change, the event that made a page look again – is asked of it before it is read. Where it has not got that, is away, or
+own change, the event that made a page look again – is asked of it before it is read. Where it has not got that, is unreachable, or
 lags too far, the server that is written to is read.
 """
 
@@ -23,7 +23,7 @@ from app.db.engine import Database
 EVERY = 1.0
 """Seconds between two looks at how far it has got."""
 WAIT = 0.2
-"""Seconds that whoever must see something waits for it here, before the other server is read."""
+"""Seconds that one who must see something waits for it here, before the other server is read."""
 REST = 5.0
 """Seconds in which it is not read after it has failed somebody."""
 
@@ -121,7 +121,7 @@ class Replica:
         return session
 
     def failed(self, error: Exception) -> None:
-        """Leave it alone for a while: it is away, or has ended a query because what it read was about to go."""
+        """Leave it alone for a while: it is unreachable, or has ended a query because what it read was about to go."""
         self._not_before = time.monotonic() + REST
         self._say(str(getattr(error, "orig", error)).split("\n", 1)[0])
 

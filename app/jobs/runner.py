@@ -57,7 +57,7 @@ class JobRunner:
 
     async def _run_while_ours(self) -> None:
         async with await self._database.connections.connect_async(application_name="inband-jobs") as conn:
-            # Asked anew before every run: it is granted again to the connection that has it, and fails with the connection.
+            # Asked again before every run: it is granted again to the connection that has it, and fails with the connection.
             while not self._closing.is_set() and await _granted(conn):
                 for job in self._jobs:
                     if self._closing.is_set():

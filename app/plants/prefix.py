@@ -2,7 +2,7 @@
 
 The pages of a plant write addresses from its root on, as if it were alone. Here every attribute of HTML that holds an address
 gets the prefix, likewise ``Location``; JSON keeps paths from the root of the plant. Assets are the same for all plants. Cookies
-are told apart by the key of the plant in their name: the overview of all plants has to see them.
+are distinguished by the key of the plant in their name: the overview of all plants has to see them.
 """
 
 import re

@@ -36,7 +36,7 @@ class PlantSettings(Settings):
     """The settings of the server as they hold for one plant."""
 
     plant: str = ""
-    """Its name, which stands beside the program's on every page."""
+    """Its name, which is beside the program's on every page."""
     prefix: str = ""
 
     @property
@@ -235,7 +235,9 @@ class Plants:
         """The hindrance to serving a plant now; None if there is none."""
         try:
             revision = current(in_schema(self._url, plant.schema))
-        except psycopg.Error as error:  # the node of Citus that it lies on is away: the others are served all the same
+        except (
+            psycopg.Error
+        ) as error:  # the node of Citus that it lies on is unreachable: the others are served all the same
             return str(error).strip().splitlines()[0]
         return None if revision == self._head else "its schema is of another Inband; `inband migrate` brings it here"
 

@@ -1,6 +1,6 @@
 """Choice of readings: by number, by time, or the last ones; the same fields in every API and page.
 
-What a period means stands in `app.core.period`, how it is written in `app.files.formats.periods`.
+What a period means is in `app.core.period`, how it is written in `app.files.formats.periods`.
 """
 
 from functools import partial

@@ -27,7 +27,7 @@ SESSION_COOKIE = "inband_session"
 STATION_COOKIE = "inband_station"
 """Of a device that is bound to a machine; sent to the pages below /station only."""
 MOST_FIELDS = 3_000
-"""Of a form of whoever is signed in: lists of characteristics to choose from are long. It is read once, where its token is checked."""
+"""Of a form of the one who is signed in: lists of characteristics to choose from are long. It is read once, where its token is checked."""
 SAFE_METHODS = frozenset({"GET", "HEAD", "OPTIONS"})
 WRITTEN_COOKIE = "inband_written"
 """Place in the log of the database at which the last change of this browser ends; see `app.web.own_changes`."""
@@ -69,7 +69,7 @@ def get_door_session(request: Request) -> Iterator[Session]:
 def _must_see(request: Request) -> MustSee | None:
     """Return what a copy must have for this request; None if it has to be answered by the server that is written to.
 
-    `Cache-Control: no-cache` asks for that: a page that is loaded anew, or a program that reads what it has just written.
+    `Cache-Control: no-cache` asks for that: a page that is loaded again, or a program that reads what it has just written.
     """
     if "no-cache" in request.headers.get("cache-control", ""):
         return None
@@ -84,7 +84,7 @@ MOST_SESSIONS, MOST_AT_DOORS, MOST_IN_TURN = 22, 8, 4
 """Requests of one process that have a session at once, those of machines, and those of anybody; others wait without a thread.
 
 Together fewer than the 40 threads that answer: a request needs one for each of its steps. If all of them waited for a
-connection, or for a lock, none would be left for whoever holds it.
+connection, or for a lock, none would be left for the one who holds it.
 """
 SessionDep = Annotated[Session, Depends(get_session, scope="function", max_concurrency=MOST_SESSIONS)]
 DoorSessionDep = Annotated[Session, Depends(get_door_session, scope="function", max_concurrency=MOST_AT_DOORS)]
@@ -110,7 +110,7 @@ def get_address(request: Request, settings: SettingsDep) -> str:
     """Address of this server: the one an administrator set, or the one that this request came by.
 
     Of a request only a host is believed that leads nowhere else: this computer by its name or loopback, or the address of the
-    socket. Any other may have been made up, and the link would lead whoever gets it to a stranger.
+    socket. Any other may have been made up, and the link would lead the one who gets it to a stranger.
     """
     if settings.public_url:
         return settings.address

@@ -37,7 +37,7 @@ def typed(schema: type[Schema], form: Mapping[str, str], **more: Any) -> Schema:
 
 
 def read(schema: type[BaseModel], form: Mapping[str, str]) -> dict[str, Any]:
-    """What a form says of each field of a schema, by name.
+    """Values of a form for the fields of a schema, by name.
 
     A length with comma or minus as people type it, in µm where the field says so; numbers between blanks, a tick, a reason
     chosen or in own words (`words`).

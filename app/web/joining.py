@@ -1,7 +1,7 @@
 """Joining files at start, so that a page asks for few: the style sheets of every page, and scripts with what they import.
 
 ``js/inband.js`` runs on every page and holds all that it imports. Any other script that no script imports statically holds what
-it imports, but takes from ``inband.js`` what is there: a page has one connection for live events, whoever listens. What is
+it imports, but takes from ``inband.js`` what is there: a page has one connection for live events, no matter who listens. What is
 imported is not served by itself.
 
 Modules keep to what is read here: ``import "./x.js"`` and ``import { a, b } from "./x.js"``, each on a line of its own, and

@@ -1,8 +1,8 @@
 """Live events: one listener per process reads the journal when it is woken, and feeds every open page.
 
 The listener asks at most ten times a second, however many readings arrive. A client that comes back with
-``Last-Event-ID`` is told first what it has missed; if that is more than the journal keeps or more than is sensible to
-send, it gets a ``resync`` and loads its page anew.
+``Last-Event-ID`` is sent first what it has missed; if that is more than the journal keeps or more than is sensible to
+send, it gets a ``resync`` and loads its page again.
 """
 
 import asyncio
@@ -25,10 +25,10 @@ log = logging.getLogger(__name__)
 
 PAUSE = 0.1  # s between two looks into the journal
 IDLE = 0.5  # s, while no page is open
-LOOK = 1.0  # s between two looks if whoever listens still may
+LOOK = 1.0  # s between two looks if anyone who listens still may
 HEARTBEAT = 5.0  # s; a page that hears nothing for longer says so
 KEPT_HOURS = 6
-MOST_MISSED = 1000  # transactions that a client which comes back is told one by one
+MOST_MISSED = 1000  # transactions that a client which comes back is informed one by one
 MOST_WAITING = 1000  # events that a slow client may be behind
 ABOUT = ("kind", "machine", "characteristic", "tool", "id", "number", "average_memory", "excluded")
 
@@ -112,7 +112,7 @@ class Live:
         granted = await self._still_granted(conn, set(listening.values()))
         for client, access in listening.items():
             if access not in granted:
-                while not client.empty():  # what waits is not told any more
+                while not client.empty():  # what waits is not reported any more
                     client.get_nowait()
                 client.put_nowait(None)
 
@@ -133,7 +133,7 @@ class Live:
                         await self._rest()
             except psycopg.Error as error:
                 outage.goes_on(error)
-                if not listening:  # the database is away: no page may go on calling itself live
+                if not listening:  # the database is unreachable: no page may go on calling itself live
                     self._let_go()
                 await asyncio.sleep(1)
             except Exception:
@@ -145,7 +145,7 @@ class Live:
         server = await (await conn.execute(TRIFLE)).fetchone()
         if self._last is None or server != self._server:
             self._last, self._server = await _newest(conn), server
-            self._let_go()  # whoever comes back loads anew
+            self._let_go()  # anyone who comes back loads again
 
     async def _rest(self) -> None:
         if self._clients:
@@ -206,7 +206,7 @@ class Live:
                     async with asyncio.timeout(HEARTBEAT):
                         next_message = await client.get()
                 except TimeoutError:
-                    # Whoever hears nothing because nothing concerns him is kept up to date all the same.
+                    # Anyone who hears nothing because nothing concerns him is kept up to date all the same.
                     yield _frame("heartbeat", {}, self._last if client.empty() else None)
                     continue
                 if next_message is None:
@@ -251,7 +251,7 @@ async def _newest(conn: AsyncConnection[Any]) -> int:
 def _messages(changes: Sequence[tuple[int, dict[str, Any]]]) -> list[Message]:
     """The changes of some transactions, in order. Only the last one of a transaction carries its number.
 
-    Whoever is cut off between two of them comes back with the number before, and is told both again.
+    Anyone who is cut off between two of them comes back with the number before, and is sent both again.
     """
     messages = []
     for at, (number, change) in enumerate(changes):

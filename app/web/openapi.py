@@ -95,7 +95,7 @@ USUAL = {
     "first_sequence": "Number of the first reading.",
     "last_sequence": "Number of the last reading.",
 }
-"""Descriptions of fields that mean the same wherever they stand, where a model says nothing of its own."""
+"""Descriptions of fields that mean the same wherever they are, where a model says nothing of its own."""
 EXAMPLES = HOUSE / "docs" / "reference" / "api-examples"
 
 

@@ -65,7 +65,7 @@ def part_of(
 
 
 def holds(text: str, *places: str | None) -> bool:
-    """Tell if every word of the text stands in one of these places, in capitals or not: `app.db.text.holds_words` for values.
+    """Tell if every word of the text is in one of these places, in capitals or not: `app.db.text.holds_words` for values.
 
     >>> holds("lathe SEAT", "Lathe 3", None, "Seat 4"), holds("mill", "Lathe 3")
     (True, False)

@@ -18,7 +18,7 @@ def problem_page(
 ) -> HTMLResponse:
     """The page for an RFC 9457 problem (`title`, `status`, `detail`, `errors`, `what_to_do`, `request_id`)."""
     whole = {"detail": "", "errors": [], "what_to_do": None, "request_id": None} | dict(problem)
-    if whole["status"] == HTTPStatus.NOT_FOUND:  # whoever reads a page has no use for the calls of the API
+    if whole["status"] == HTTPStatus.NOT_FOUND:  # anyone who reads a page has no use for the calls of the API
         whole["what_to_do"] = _(
             "Check the address, or start from the plant page: an old link may point to something deleted."
         )

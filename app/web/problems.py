@@ -245,7 +245,7 @@ async def unforeseen(request: Request, error: Exception) -> Response:
 
 
 def incident(request: Request, error: BaseException) -> Response:
-    """An unhandled error: logged in full under the id of the request, told with nothing but that id."""
+    """An unhandled error: logged in full under the id of the request, reported with nothing but that id."""
     number = REQUEST.get() or "-"
     log.error("unhandled error in %s %s", request.method, request.url.path, exc_info=error)
     return answer(

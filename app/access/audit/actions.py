@@ -30,7 +30,7 @@ def record(
 
     ``action`` is a short verb phrase (`characteristic changed`), ``subject`` names what was changed as `kind/key`
     (`characteristic/shaft-d40`, `tool/lathe-1/3`). Secrets and passwords are never part of before and after. ``by``: whose
-    name ``actor`` is; without it, whoever sent this request.
+    name ``actor`` is; without it, the sender of this request.
     """
     database: Database | None = session.info.get("database")
     if database is not None and database.copy_of is not None:  # what was only read has no transaction to be noted in

@@ -2,7 +2,7 @@
 
 Each module has ``Settings`` (a msgspec Struct: the kind's own table), ``link(machine)``, and ``NUMBERED = True`` where the
 control knows characteristics by numbers, and ``MEANING``: names of settings that change the meaning of a register, which a
-touch test has to prove anew. It is imported when a machine needs it: some need a library that is an extra.
+touch test has to prove again. It is imported when a machine needs it: some need a library that is an extra.
 """
 
 from importlib import import_module

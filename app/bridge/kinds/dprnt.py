@@ -1,7 +1,7 @@
 """Readings that an NC program prints by DPRNT (Fanuc and its like): from a serial port, a TCP connection, or a file.
 
 The control prints and asks nothing back, so nothing can be acknowledged, and nothing is corrected. What gets lost on the way is
-told by its number, and comes again with the second print at the end of the program. A reading is known by epoch and sequence.
+found by its number, and comes again with the second print at the end of the program. A reading is known by epoch and sequence.
 """
 
 import contextlib
@@ -161,7 +161,7 @@ class PrintedLink:
         return " ".join(words)
 
     async def acknowledge(self, received: Sequence[Received]) -> None:
-        """They are stored: they need not come again. The control cannot be told."""
+        """They are stored: they need not come again. The control cannot be informed."""
         del self._unstored[: len(received)]
 
     async def offer(self, orders: Sequence[Order]) -> None:

@@ -2,7 +2,7 @@
 
 The folder is looked at again and again: shares tell nobody of a new file. A file is read when two looks find it the same. It is
 moved when all its readings are stored durably, into the folder of done files or, with a text that says why, of failed
-ones. It is never deleted. Nothing goes back to the machine. Links are not followed: whoever may write into the folder would have
+ones. It is never deleted. Nothing goes back to the machine. Links are not followed: anyone who may write into the folder would have
 the bridge read what only the bridge may.
 """
 
@@ -136,7 +136,7 @@ class Folder:
 
     @property
     def carries_decisions(self) -> bool:
-        """A stop reaches whoever looks at the file."""
+        """A stop reaches those who look at the file."""
         return self.settings.decisions is not None
 
     async def decide(self, decided: Sequence[Decided]) -> None:

@@ -52,7 +52,7 @@ class Settings(Struct, forbid_unknown_fields=True, frozen=True):
     topics. client_id: ``inband-bridge-`` and the machine's key if left out; no other client may have it. username; password in a
     file or in a variable of the environment. tls, ca: a file with the authority of the broker's certificate, if it is one of
     the plant's own. certificate, private_key: files of the client's own. session: s that the broker keeps messages for a
-    bridge that is away. valid: s after which a list of corrections that was not renewed counts no longer. keepalive: s.
+    bridge that is unreachable. valid: s after which a list of corrections that was not renewed counts no longer. keepalive: s.
 
     fields: members of messages of another form by field of `app.bridge.fields.FIELDS`, see `app.bridge.messages`; readings: their
     topic, if it is another; decimal, times and zone of what they say in texts.
@@ -348,7 +348,7 @@ class MqttLink:
             self._done(message)
 
     async def tell_refused(self, key: str, reason: str) -> None:
-        """Tell the machine that a reading, whose key it was told as stored, was refused by the server."""
+        """Tell the machine that a reading, whose key was confirmed to it as stored, was refused by the server."""
         await self._publish("stored", {"key": key, "refused": reason})
 
     # --- corrections

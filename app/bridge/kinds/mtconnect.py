@@ -1,7 +1,7 @@
 """MTConnect: program, tool and part count of a machine as context of its readings. No control, and never a correction.
 
 The agent keeps the last observations in a ring and numbers them; ``sample`` answers those from a number on. Another instanceId
-means that the agent has started anew and counts from 1. What the agent did not tell stays unknown: a reading gets no part then.
+means that the agent has restarted and counts from 1. What the agent did not tell stays unknown: a reading gets no part then.
 """
 
 import asyncio
@@ -196,7 +196,7 @@ class Context:
         )
 
     def with_parts(self, received: Sequence[Received]) -> Sequence[Received]:
-        """The same readings; those without a part have the one that the agent told for the time of their measurement."""
+        """The same readings; those without a part have the one that the agent reported for the time of their measurement."""
         return [
             replace(each, body=each.body | {"part": part})
             if not each.body.get("part") and (part := self.part_at(each.body.get("measured_at"))) is not None
@@ -205,7 +205,7 @@ class Context:
         ]
 
     def part_at(self, at: object) -> str | None:
-        """The part at a time (ISO 8601 with offset); None if the agent has not told it, or has been away since."""
+        """The part at a time (ISO 8601 with offset); None if the agent has not reported it, or has been unreachable since."""
         moment = _moment(at) if isinstance(at, str) else None
         if moment is None or self._until is None or moment > self._until + self._trusted:
             return None
@@ -299,7 +299,7 @@ class Context:
                     self._items[item] = name, len(self._items)
 
     def _told(self, observations: Sequence[Observation]) -> dict[str, int]:
-        """The rank of the best data item that has a value, of each that is told."""
+        """The rank of the best data item that has a value, of each that is reported."""
         found: dict[str, int] = {}
         for each in observations:
             if each.value is not None and each.item in self._items:

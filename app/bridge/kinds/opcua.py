@@ -1,6 +1,6 @@
 """SINUMERIK 840D sl, 828D and ONE by OPC UA: register block in user data (GUD) or R parameters, wear of tools.
 
-Identifiers stand in namespace 2 and are composed: browsing shows the first element of each array only. One array read
+Identifiers are in namespace 2 and are composed: browsing shows the first element of each array only. One array read
 brings the whole block. Polling, no subscriptions: a control samples at 100 ms at best and shows only the last value.
 
 Nothing is sent again by itself: a connection that is lost stays lost until `SinumerikRegisters.connect`, so that no write
@@ -177,7 +177,7 @@ class SinumerikRegisters:
         return f"{R_PARAMETERS if in_r else settings.gud}[{unit}{start}{array}]"
 
     def offset_id(self, location: Location) -> str:
-        """The identifier of a location's offset: parameters of all edges of a tool stand in one row."""
+        """The identifier of a location's offset: parameters of all edges of a tool are in one row."""
         index = (location.edge - 1) * self._edge_size + self.parameter(location)
         return f"{EDGE_DATA}[u{self.settings.tool_area},c{location.tool},{index}]"
 
@@ -221,7 +221,7 @@ class SinumerikRegisters:
                     settings.key,
                     server_certificate=settings.control_certificate,
                 )
-            async with asyncio.timeout(self.machine.patience * 0.8):  # so that it is told what is asked for in vain
+            async with asyncio.timeout(self.machine.patience * 0.8):  # so that it hears what is asked for in vain
                 await client.connect()
         except BaseException as error:
             client.disconnect_socket()

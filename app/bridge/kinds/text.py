@@ -185,7 +185,7 @@ class TextLink:
         return " ".join(words)
 
     async def acknowledge(self, received: Sequence[Received]) -> None:
-        """They are stored. The machine cannot be told."""
+        """They are stored. The machine cannot be informed."""
         del self._unstored[: len(received)]
 
     async def offer(self, orders: Sequence[Order]) -> None:

@@ -1,7 +1,7 @@
 """A simulated control that prints: on a TCP port like a serial server, and on a pseudo terminal like a serial port.
 
 It pads numbers with blanks, prints ``-`` in front of the padding, asks nothing back, and prints the last eight again after each
-part. Whoever is not connected misses what is printed.
+part. Anyone who is not connected misses what is printed.
 """
 
 import asyncio

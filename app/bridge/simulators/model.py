@@ -1,6 +1,6 @@
 """One model of a machine: registers, tool offsets, the NC program, a person at the panel, and power that may fail.
 
-The NC program is a generator that stops after every register it writes: whoever drives it decides what happens in between – a
+The NC program is a generator that stops after every register it writes: anyone who drives it decides what happens in between – a
 bridge that reads half a slot, a power loss, an operator. What the model has measured and applied, it remembers as the truth
 that a test compares with. Offsets and sizes are in the control's unit.
 """
@@ -294,7 +294,7 @@ class Model:
         self.offsets[place] = offset
 
     def power_loss(self, *, battery: bool = True) -> None:
-        """Stop the program wherever it stands; without a battery every register is 0 afterwards."""
+        """Stop the program wherever it is; without a battery every register is 0 afterwards."""
         self.running = False
         self.tool_in_spindle = 0
         if not battery:

@@ -73,7 +73,7 @@ class AgentSimulator:
         await asyncio.gather(*tasks, return_exceptions=True)
 
     def restart(self) -> None:
-        """Begin anew: another instance, numbers from 1, nothing known."""
+        """Begin again: another instance, numbers from 1, nothing known."""
         self.instance = max(self.instance + 1, int(time.time()))
         self.next = 1
         self.entries.clear()

@@ -1,6 +1,6 @@
 """A simulated SINUMERIK behind OPC UA: the model of a machine, and what the manual says of the control's server.
 
-* The state of the NC is copied every 100 ms; whoever reads in between reads the state before, his own writes too.
+* The state of the NC is copied every 100 ms; anyone who reads in between reads the state before, his own writes too.
 * Browsing shows the first element of each array; other identifiers are composed, and have no node.
 * ``X[u1,1,12]`` and ``X[u1,1,#12]`` are rows 1 to 12, an array. What the machine does not have reads BadAttributeIdInvalid,
   what is mistyped BadNodeIdUnknown.

@@ -37,7 +37,7 @@ CYCLE = 120.0  # s of life per part
 def start(url: str, admin_key: str, speed: float, folder: Path) -> None:
     """Set the machine up, and let its control and the bridge run in a thread until the server's process ends.
 
-    folder: of the bridge's store, begun anew each time as the control's counters are.
+    folder: of the bridge's store, begun again each time as the control's counters are.
     """
     with Client(url, admin_key) as admin:
         _set_up(admin)

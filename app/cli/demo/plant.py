@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 class Effect(NamedTuple):
     """Effect of a tool on a feature.
 
-    The factor that the server must be told follows from it (domain §3), but is written at each feature by
+    The factor that the server must know follows from it (domain §3), but is written at each feature by
     hand, as on a real shop floor: a wrong one makes the loop run away, and a test looks at just that.
 
     gain: change of size per change of offset. wears: +1, the feature grows as the edge recedes; -1, it shrinks.

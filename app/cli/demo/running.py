@@ -1,4 +1,4 @@
-"""One machine of the plant in its loop: fetch corrections, cut, measure, report, stop when it is told to.
+"""One machine of the plant in its loop: fetch corrections, cut, measure, report, stop when it is ordered to.
 
 Simulated seconds become times as follows: the past that is pushed at the start ends at the start and runs at its own
 pace; from there on the plant runs `speed` times as fast as it says, so its times are those of the wall clock.
@@ -61,7 +61,7 @@ class Line:
         self._rng = rng
         self._ending = ending
         self._changed_at: dict[int, str | None] = {}
-        self._fault_told = False  # the machine was told to stop because of what its dirty stylus measured
+        self._fault_told = False  # the machine was ordered to stop because of what its dirty stylus measured
         self._patience: dict[str, float] = {}  # what waits for a person, and until when we leave it to others
         self.pace = Pace(1.0, datetime.now(UTC), 0.0)
 
@@ -115,7 +115,7 @@ class Line:
             self._apply(self._push_batch(self.machine.measure(drain=True)))
 
     def _change_worn_tools_of_the_past(self) -> None:
-        """Between two parts, when all that the old edge has cut is measured and what was decided on it stands in its offset."""
+        """Between two parts, when all that the old edge has cut is measured and what was decided on it is in its offset."""
         machine = self.machine
         worn = [number for number, edge in machine.edges.items() if edge.parts >= edge.tool.life]
         if not worn:
@@ -196,7 +196,7 @@ class Line:
         self._change_worn_tools()
 
     def _push(self, probes: list[Probe]) -> None:
-        """One reading after the other; a machine that is told to stop does not go on probing."""
+        """One reading after the other; a machine that is ordered to stop does not go on probing."""
         for probe in probes:
             if self._gateway.push(self._reading(probe)).action == "stop":
                 self._fault_told = True

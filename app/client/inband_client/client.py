@@ -22,7 +22,7 @@ Item = TypeVar("Item")
 
 
 class Client:
-    """Calls an Inband server, and waits for it when it is away. Several threads may share one.
+    """Calls an Inband server, and waits for it when it is unreachable. Several threads may share one.
 
     url: of the server, with the prefix of a plant if it has one (``https://inband.example/p/east``). key: of the machine, or
     of a role. patience: seconds for which a call is tried again after 5xx, 429, a time-out or a cut line, if trying again

@@ -71,5 +71,5 @@ def _event(kind: str, event_id: int | None, data: str) -> Event:
         return Event(kind=kind, event_id=event_id)
     try:
         return read(Event, told | said)
-    except Unreadable:  # a field has another type than today: it is told all the same
+    except Unreadable:  # a field has another type than today: it is reported all the same
         return Event(kind=kind, event_id=event_id, extra=told)

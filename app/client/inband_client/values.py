@@ -264,7 +264,7 @@ class Event:
     """A live event: it says what changed, not how; look the thing up.
 
     kind: `reading`, `correction`, `alarm`, `tool` …; `hello`: you are connected, and hear from now on; `resync`: more was
-    missed than the server keeps, load anew what you show. event_id: resume after this.
+    missed than the server keeps, load again what you show. event_id: resume after this.
     """
 
     kind: str

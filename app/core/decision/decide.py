@@ -16,7 +16,7 @@ probe fault        >= R36         none, alarm, the decision is to stop        un
 **No double correction.** Parts already cut when a correction is issued come out with the old
 offset. `decide` therefore judges the deviation that the part would have had with every correction
 issued so far (`outstanding`); the raw deviation is what is stored and charted. Two things are facts
-about the part itself and are told by the raw deviation whatever has been corrected since: that it is
+about the part itself and are judged by the raw deviation whatever has been corrected since: that it is
 out of tolerance, and that the probe cannot be believed (R36).
 
 **A tool that is measured itself** shows no correction: its size is what it is. It is judged with all corrections since it was

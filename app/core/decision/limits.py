@@ -1,6 +1,6 @@
 """Zone limits and the border rules: they live here and nowhere else, for numbers, arrays and SQL (domain §3).
 
-Six bands lie symmetrically about the target, told apart by the size of the deviation alone:
+Six bands lie symmetrically about the target, distinguished by the size of the deviation alone:
 
 ======================  ==========================  ============================================
 zone                    holds while                 a value exactly on the outer limit

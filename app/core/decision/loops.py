@@ -155,7 +155,7 @@ class Mark(IntEnum):
     """Bits of what happens at a reading, whatever the policy."""
 
     BEGIN = 1  # a fresh edge, an offset set by hand, or the first reading: the offset is what it was then
-    RESTART = 2  # M begins anew: target or empirical value have changed
+    RESTART = 2  # M begins again: target or empirical value have changed
     PAUSED = 4  # an alarm paused compensation
     REJECTED = 8  # not accepted by n of m
     JUMP = 16  # implausible

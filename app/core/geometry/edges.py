@@ -1,6 +1,6 @@
 """Sides that an edge finder has touched: pocket, web and corner. What is asked of the touches, and the least squares.
 
-The equation and what it is for stand in `work_zero`. Lengths mm, angles degrees.
+The equation and what it is for are in `work_zero`. Lengths mm, angles degrees.
 """
 
 from collections.abc import Callable, Sequence

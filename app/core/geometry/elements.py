@@ -45,7 +45,7 @@ class Element:
     """An axis or a plane: the points it goes through, its direction or normal, and how certain these are.
 
     cofactors: of each point, 3 x 3. tilt: cofactors of the direction, 3 x 3. lengthwise: whether `direction` lies along
-    the element (an axis) or stands on it (a plane's normal).
+    the element (an axis) or is on it (a plane's normal).
     """
 
     points: Floats

@@ -138,7 +138,7 @@ def _turn(nominal: Sequence[Place], measured: Sequence[Place]) -> tuple[float, f
 
 
 class Table(NamedTuple):
-    """A rotary table. centre: where its axis stands in the part's nominal coordinates, mm. position: where it is, degrees.
+    """A rotary table. centre: where its axis is in the part's nominal coordinates, mm. position: where it is, degrees.
 
     clockwise: whether a positive command turns the part clockwise seen from +Z, as ISO 841 has it for an axis that carries
     the part (so that the tool goes round it counter-clockwise).

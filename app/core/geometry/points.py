@@ -79,7 +79,7 @@ def extents(points: Floats) -> tuple[Floats, Floats]:
 def surface_of(points: ArrayLike, at_least: int) -> Floats:
     """Points as rows that spread over a surface, as many different ones as are needed.
 
-    Touches in a row lie in many planes; which one is nearest is told by their scatter alone, and a bow along the row would
+    Touches in a row lie in many planes; which one is nearest is found by their scatter alone, and a bow along the row would
     be flat in it. Raises `Degenerate` as `points_of` does, and for touches in a row.
 
     >>> surface_of([(0, 5, 0.05), (50, 5.0004, 0), (100, 4.9997, 0.05), (25, 5, 0.01)], 4)

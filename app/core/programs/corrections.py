@@ -36,7 +36,7 @@ LAST_REGISTER = {Form.WEAR_VARIABLES: 99, Form.WEAR_VARIABLES_2000: 64}
 
 
 class PendingCorrection(NamedTuple):
-    """A pending correction, in the order in which they are to be applied. fetched: it stands in a text already."""
+    """A pending correction, in the order in which they are to be applied. fetched: it is in a text already."""
 
     number: int
     tool: int

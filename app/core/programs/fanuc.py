@@ -133,7 +133,7 @@ class _Reader:
             notes.append(Note("words", {"words": numbered}) if numbered else Note("empty", {}))
 
     def _steps(self, body: str, notes: list[Note]) -> str:
-        """Note the steps of a printed macro; return what else stands in the block."""
+        """Note the steps of a printed macro; return what else is in the block."""
         steps, rest = printed_macros.steps(body, printed_macros.FANUC)
         for step in steps:
             if step.data["step"] in {"measured", "size", "centre"} and step.data["r"] in self.results:

@@ -368,7 +368,7 @@ def _frame_list(text: FrameText) -> Iterator[str]:
 def stop_block(control: str, title: str, codes: Sequence[str]) -> Iterator[str]:
     """Yield the lines that stop the control for good while warnings are not acknowledged; none without a code.
 
-    A cycle start does not go past them: they stand in a loop, or raise an alarm that only a reset ends.
+    A cycle start does not go past them: they are in a loop, or raise an alarm that only a reset ends.
 
     >>> print(*stop_block("fanuc", "INBAND ALIGNMENT 7 FOR MILL-1", ["turned_far"]), sep="\\n")
     (INBAND ALIGNMENT 7 FOR MILL-1)

@@ -176,7 +176,7 @@ class _Reader:
         )
         self.call = None
 
-    # --- what stands behind an equals sign
+    # --- what is behind an equals sign
 
     def _assignments(self, number: int, body: str, notes: list[Note]) -> None:
         rest = body

@@ -210,7 +210,7 @@ def mixed(units: Iterable[bool | None]) -> bool:
 
 
 def is_remark(block: str, rest: str) -> bool:
-    """Tell if the rest of a block is words for people that stand there without ``;`` or brackets.
+    """Tell if the rest of a block is words for people that are there without ``;`` or brackets.
 
     block: what was read before it. Only words without numbers and signs are a remark, and only where they are not in the
     capitals that the block itself is written in, so that no statement of a control passes for one.

@@ -87,7 +87,7 @@ def target(nominal: float, radius: float) -> float:
 
 
 def steps(body: str, patterns: Iterable[_Step]) -> tuple[list[Note], str]:
-    """The steps of a printed macro in a block, and what else stands there.
+    """The steps of a printed macro in a block, and what else is there.
 
     >>> steps("#501 =#5021 M00", FANUC)
     ([Note(code='step', data={'step': 'touch', 'r': '#501', 'axis': 'X'})], 'M00')

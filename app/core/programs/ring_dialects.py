@@ -166,7 +166,7 @@ class Dialect(ABC):
 
 
 def _registers(*expressions: str) -> str:
-    """The names of registers in these expressions: what stands behind a line as a comment."""
+    """The names of registers in these expressions: what is behind a line as a comment."""
     found = {
         node.id.replace("_", " "): None
         for text in expressions

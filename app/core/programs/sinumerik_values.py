@@ -38,7 +38,7 @@ class Building:
 
 
 class _Assembly:
-    """Makes a program of what was assigned; says beside the lines what was not taken as it stands."""
+    """Makes a program of what was assigned; says beside the lines what was not taken as it is."""
 
     def __init__(self, built: Building, notes: list[list[Note]]) -> None:
         self.built, self.line_notes = built, notes
@@ -208,5 +208,5 @@ def _plain(name: str, value: Any) -> Any:
 
 
 def program_of(built: Building, notes: list[list[Note]]) -> Program:
-    """The program of what was assigned. What was not taken as it stands is said in the notes of its line."""
+    """The program of what was assigned. What was not taken as it is is said in the notes of its line."""
     return _Assembly(built, notes).made()

@@ -4,7 +4,7 @@ For C, with R the rotation by the angle φ and p0 the ball's nominal centre at �
 
     d(φ) = P - R p0 = (I - R) t + (w x R p0 - R (w x p0)) + R s - b a/2 (z x R p0)
 
-t = (EX0C, EY0C, 0) is where the axis stands beside its nominal place, w = (EA0C, EB0C, 0) how it leans. Besides the
+t = (EX0C, EY0C, 0) is where the axis is beside its nominal place, w = (EA0C, EB0C, 0) how it leans. Besides the
 domain's model: s, how far the ball lies from its nominal centre (left out with ``ball_known``), and the backlash b where
 every angle is approached from both sides (a = +1 in the positive direction, -1 in the negative: the axis lags behind).
 A and B follow by cyclic exchange of X, Y, Z. Linear least squares over all positions; lengths in mm, angles in degrees.
@@ -40,7 +40,7 @@ ERRORS: dict[AxisName, tuple[str, str, str, str]] = {
 """The position errors of each axis in the order of QS144 to QS146: two in mm, two in degrees."""
 
 FEWEST = 3
-NARROWEST_ARC = 60.0  # degrees; on less, where the axis stands and where the ball lies can hardly be told apart
+NARROWEST_ARC = 60.0  # degrees; on less, where the axis stands and where the ball lies can hardly be distinguished
 WORST_CONDITION = 1e6
 EXACT = 1e-9  # mm; what scatters less does not scatter
 SMALLEST_RADIUS = 1.0  # mm; a ball (nearly) on the axis does not move when it turns
@@ -90,7 +90,7 @@ class Position(NamedTuple):
 
 
 class Estimate(NamedTuple):
-    """A value with its standard deviation, in the same unit; None where nothing scatters that it could be told from."""
+    """A value with its standard deviation, in the same unit; None where nothing scatters that it could be distinguished from."""
 
     value: float
     deviation: float | None
@@ -200,7 +200,7 @@ def estimate(
     if not ball_known:
         by_letter = dict(zip(order, values[-3:], strict=True))
         shift = (by_letter[0], by_letter[1], by_letter[2])
-    leaning = np.array([solved[3], -solved[2]]) * nominal[2]  # where the axis stands at the height of the ball
+    leaning = np.array([solved[3], -solved[2]]) * nominal[2]  # where the axis is at the height of the ball
     centre = nominal[:2] - solved[:2] - leaning + (0 if ball_known or head else solved[-3:-1])
     radius = hypot(float(centre[0]), float(centre[1]))
     if radius < SMALLEST_RADIUS:

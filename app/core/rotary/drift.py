@@ -40,7 +40,7 @@ class Change(NamedTuple):
 
     @property
     def moved(self) -> bool | None:
-        """True if the difference is more than scatter; None where it cannot be told."""
+        """True if the difference is more than scatter; None where it cannot be found."""
         return None if self.deviation is None else abs(self.difference) > COVERAGE * self.deviation
 
 

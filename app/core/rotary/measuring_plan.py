@@ -1,7 +1,7 @@
 """The measuring plan of rotary axes (cycles 451 and 452): the angles at which each axis is measured, and what to check before.
 
 The control measures A, then B, then C. The positions of an axis run in equal steps from its start to its end angle; an axis
-with Hirth teeth stands on the nearest tooth. Lengths are mm, angles degrees, feeds mm/min.
+with Hirth teeth is on the nearest tooth. Lengths are mm, angles degrees, feeds mm/min.
 """
 
 from collections.abc import Iterator

@@ -102,7 +102,7 @@ def read_string(parameter: str, text: str) -> ResultString:
 
 
 def read_number(text: str) -> tuple[float | None, Damage | None]:
-    """A number as the control writes it, and what is wrong with it; a decimal comma is read and told.
+    """A number as the control writes it, and what is wrong with it; a decimal comma is read and reported.
 
     >>> read_number("-0.0123456"), read_number("0,5"), read_number("1.2.3")[1].value
     ((-0.0123456, None), (0.5, <Damage.COMMA: 'comma'>), 'not_a_number')

@@ -22,7 +22,7 @@ from app.core.spc.shewhart import Chart
 
 NODES, WEIGHTS = np.polynomial.legendre.leggauss(200)
 LONGEST = 1e9
-"""Points: rarer than once in so many is not told apart. A process of a part per second takes thirty years for them, and
+"""Points: rarer than once in so many is not distinguished. A process of a part per second takes thirty years for them, and
 the equations behind the longer run lengths cannot be solved with sixteen digits."""
 FARTHEST = 9.0  # sigma; beyond it lies nothing
 

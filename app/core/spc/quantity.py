@@ -15,7 +15,7 @@ wear_residuals         w_i - level of the edge - slope (i - first of the edge)  
 
 Differences of neighbours share a reading, so they go up and down by turns by themselves: only the limits have a meaning
 on them, and sigma is their standard deviation. Of residuals the slope is that of the baseline and stays so; the level is
-set anew by every edge when it has run in, and its readings until then are judged by nothing, for how an edge was set is no
+set again by every edge when it has run in, and its readings until then are judged by nothing, for how an edge was set is no
 signal of the process (Mandel 1969, The regression control chart, J. Qual. Technol. 1). Lengths are mm.
 """
 

@@ -1,6 +1,6 @@
 """Rules that watch a chart while readings come in. A new reading costs what it costs, however many there were before.
 
-Every rule begins with the first point that is complete after the reading named for it: nothing is told of what lies before.
+Every rule begins with the first point that is complete after the reading named for it: nothing is known of what lies before.
 
     >>> watch = Watch(ChartSettings(Chart.INDIVIDUALS), {RuleName.NELSON_1: 10, RuleName.NELSON_2: 0})
     >>> at = np.arange(9, 18)

@@ -165,7 +165,7 @@ class Fact:
 
 @dataclass(frozen=True, slots=True)
 class Column:
-    """A column of a table: `share` is how wide it is among the others, `aligned` how it stands."""
+    """A column of a table: `share` is how wide it is among the others, `aligned` its state."""
 
     key: str
     name: str
@@ -231,7 +231,7 @@ class Section:
 class Report:
     """A characteristic and a period. `zone` names the time zone in which moments are read.
 
-    warnings: what stands above everything else.
+    warnings: what is above everything else.
     """
 
     key: str

@@ -1,4 +1,4 @@
-"""A report as JSON. Numbers in the unit that stands beside them; lengths as people read them, in µm and mm."""
+"""A report as JSON. Numbers in the unit that is beside them; lengths as people read them, in µm and mm."""
 
 from datetime import datetime
 
@@ -33,7 +33,7 @@ class FactOut(ReportValueOut):
 
     @classmethod
     def of_fact(cls, fact: Fact, report: Report) -> "FactOut":
-        """With everything that stands beside it."""
+        """With everything that is beside it."""
         return cls(
             **ReportValueOut.of(fact.value, report).model_dump(),
             key=fact.key,

@@ -1,7 +1,7 @@
 """AQDEF files (Q-DAS ASCII transfer format) read: `.dfq`, or a description `.dfd` with its values `.dfx`.
 
 A line is `Kxxxx/i value`: K1… belongs to a part, K2…, K3… and K8… to the characteristic i, K4… to catalogues, K51… to the tree, K0001 to
-K0099 to measured values. Without an index it is 1; index 0 is all. Values stand in K lines, or in one line for all characteristics:
+K0099 to measured values. Without an index it is 1; index 0 is all. Values are in K lines, or in one line for all characteristics:
 `aqdef_values` takes both. A file is read twice, once for what it
 describes and once for its values, one line after the other: however long it is, little of it is in memory.
 Sources: the fields and catalogues as Hexagon lists them for *Q-DAS ASCII Transfer Format*, version 12; how files deviate
@@ -79,7 +79,7 @@ class Characteristic:
 class Description:
     """The lines of a file that describe: parts, characteristics, catalogues.
 
-    of_values: line and fields by characteristic and number of the value (K0014/1/7), which may stand anywhere; 0 is all.
+    of_values: line and fields by characteristic and number of the value (K0014/1/7), which may be anywhere; 0 is all.
     """
 
     encoding: str = "utf-8"

@@ -111,7 +111,7 @@ class _Reading:
         self._before: list[str] = []  # of the one above
         self._timed: set[int] = set()  # characteristics whose values have a time of their own
         self._for_all: dict[str, str] = {}
-        self._above: set[str] = set()  # fields for all that stand above their values, as above the first ones
+        self._above: set[str] = set()  # fields for all that are above their values, as above the first ones
         self._waiting: Remark | None = None  # the last of them, until its values come
         self._closed = False  # by a field for all: what comes next is another row
         self._told: set[str] = set()  # fields for all since it was closed
@@ -193,7 +193,7 @@ class _Reading:
         return of_all | fields | of_row | own
 
     def _ahead(self) -> dict[int, Value]:
-        """Fields of single characteristics that stand above the line of their values, as the first ones do."""
+        """Fields of single characteristics that are above the line of their values, as the first ones do."""
         if self._begins is None or self._begins in _VALUE_ITSELF:
             return {}
         return {
@@ -281,7 +281,7 @@ class _Reading:
 
     def _of_one(self, number: int, key: str, index: int, value: str) -> Iterator[Value | Remark]:
         first = "K0020" if self._characteristics[index].counts else "K0001"
-        # Where values stand in K lines, the first field of the first one begins the others too.
+        # Where values are in K lines, the first field of the first one begins the others too.
         self._begins = self._begins or (first if self._rows else key)
         self._waiting = None
         current = self._open.get(index)
@@ -345,7 +345,7 @@ def read_value(value: Value, order: DayOrder | None = None) -> "Measured | Remar
 def process_of(text: str) -> dict[int, float] | None:
     """Process parameters (K0011) by their number in the catalogue; None where the text is something else.
 
-    A comma parts them, unless what stands behind it can only be decimal places.
+    A comma parts them, unless what is behind it can only be decimal places.
 
     >>> process_of("1/0.5,2/-3"), process_of("1/21,5"), process_of("21,5")
     ({1: 0.5, 2: -3.0}, {1: 21.5}, None)
@@ -405,7 +405,7 @@ def _several(text: str) -> list[str]:
 
 
 def _entry(text: str) -> int | str:
-    """The number of a catalogue's entry, 0 where nothing is said; or the name that stands in its place."""
+    """The number of a catalogue's entry, 0 where nothing is said; or the name that is in its place."""
     text = text.strip()
     try:
         return _whole(text)

@@ -286,7 +286,7 @@ def folded(text: str) -> str:
 
 
 def _without_brackets(text: str) -> str:
-    """The text with a blank for each bracket and what stands in it, up to the first sign that closes one."""
+    """The text with a blank for each bracket and what is in it, up to the first sign that closes one."""
     kept, end = [], 0
     while (opened := _OPENING.search(text, end)) and (closed := _CLOSING.search(text, opened.end())):
         kept += [text[end : opened.start()], " "]

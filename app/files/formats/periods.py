@@ -1,6 +1,6 @@
 """Periods as people and programs write them, the same at every door: in an address, a form, a command, JSON.
 
-A day written as a day is that whole day by the clock of the plant (or of the zone that is named), wherever it stands: as the end it
+A day written as a day is that whole day by the clock of the plant (or of the zone that is named), wherever it is: as the end it
 is included. A moment is that moment: readings at the end itself belong to the next period. A moment that the clock shows
 twice is the earlier one where a period begins, and the later one where it ends.
 """

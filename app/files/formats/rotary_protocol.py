@@ -177,7 +177,7 @@ def _by_blanks(text: str) -> tuple[str, str] | None:
 
 
 def _heading(words: str, label: str, values: Sequence[str]) -> str:
-    """Letter of an axis that stands alone: beside the word for it, or as the whole of a heading; else nothing."""
+    """Letter of an axis that is alone: beside the word for it, or as the whole of a heading; else nothing."""
     if not values:
         return label
     return values[0] if len(values) == 1 and _ALONE.fullmatch(words) else ""

@@ -84,7 +84,7 @@ RULES: tuple[tuple[str, tuple[str, ...]], ...] = (
     ("mode", ("modus", "=mode", "nacin")),
     ("tool", ("=werkzeug", "=werkzeugname", "tool name", "ime orodj", "=orodje")),
 )
-SETTINGS = ("q432", "winkelbereich", "angle range", "kompenz")  # what the cycle was told, not what it found
+SETTINGS = ("q432", "winkelbereich", "angle range", "kompenz")  # what was set for the cycle, not what it found
 EARLIER = ("=vor", "=before", "=pred")
 
 

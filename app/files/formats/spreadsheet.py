@@ -38,7 +38,7 @@ Spend = Callable[[int], None]
 def texts(path: Path, folder: Path, stem: str, spend: Spend = lambda _bytes: None) -> dict[str, Path]:
     """Write each sheet that holds something as `stem.1.data`, `stem.2.data` … in the folder; their files by name of the sheet.
 
-    spend: is told of bytes before they are written. Raises `Unusable` for what is no workbook, or holds nothing.
+    spend: is called with bytes before they are written. Raises `Unusable` for what is no workbook, or holds nothing.
     """
     from openpyxl import load_workbook
 

@@ -67,7 +67,7 @@ class UnknownUnit(Exception):
 def unit_in(header: str) -> str | None:
     """The unit that the name of a column carries, in brackets or as its last word. Raises `UnknownUnit`.
 
-    What stands in square brackets is a unit, unless it holds a digit; in round ones if it is short and no usual word.
+    What is in square brackets is a unit, unless it holds a digit; in round ones if it is short and no usual word.
 
     >>> unit_in("Wert [µm]"), unit_in("размер (мкм)"), unit_in("D40_mm"), unit_in("D (X)"), unit_in("measured")
     ('um', 'um', 'mm', None, None)

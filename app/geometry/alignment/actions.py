@@ -119,7 +119,7 @@ def compose(session: Session, body: PalletIn, caller: Caller) -> Created[Alignme
     inputs: Values = {"pallet": pallet.id, "part": part.id} | (
         {"pose": body.pose.model_dump()} if body.pose is not None else {}
     )
-    # The text is for the machine that the pallet stands on.
+    # The text is for the machine that the pallet is on.
     inputs |= {name: pallet.given[name] for name in ("work_offset", "base", "table") if name in pallet.given}
     if (before := _sent_before(session, machine, body.key, "pallet", "exact", inputs)) is not None:
         return before

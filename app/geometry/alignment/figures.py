@@ -105,7 +105,7 @@ def enlargement(factor: float) -> int:
 def _ends(places: Floats, normals: Floats) -> Floats:
     """Ends of the part that are probed, by axis: -1, 1, both (2) or none (0).
 
-    Told by where the touches lie, so that it does not matter whether a normal points out of the part or into it.
+    Found by where the touches lie, so that it does not matter whether a normal points out of the part or into it.
     """
     low, high = places.min(axis=0), places.max(axis=0)
     ends = np.zeros(3)

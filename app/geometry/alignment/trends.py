@@ -23,7 +23,7 @@ class Mark(NamedTuple):
 
 
 def trend(marks: Sequence[Mark]) -> Chart:
-    """Shifts above, turns below, one line for each axis, told apart by their marks as well."""
+    """Shifts above, turns below, one line for each axis, distinguished by their marks as well."""
     shifts = [_course(marks, axis, [mark.shift[axis] * 1000 for mark in marks], "µm", 1) for axis in range(3)]
     turns = [_course(marks, axis, [mark.turns[axis] for mark in marks], "°", 4) for axis in range(3)]
     return Chart(

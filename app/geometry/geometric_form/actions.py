@@ -1,4 +1,4 @@
-"""Measuring form, and computing it anew. Lengths in mm.
+"""Measuring form, and computing it again. Lengths in mm.
 
 Nothing here changes what readings are decided by, so no machine is locked: the result becomes a reading at the door of
 readings, like any other.
@@ -125,7 +125,7 @@ def _sent_before(session: Session, machine: Machine, body: FormIn) -> Created[Fo
 
 
 def recompute(session: Session, number: int, reason: str, caller: Caller) -> FormRow:
-    """Evaluate the stored touches anew; the evaluations before stay on record. Raises `NotFound`, `Invalid`."""
+    """Evaluate the stored touches again; the evaluations before stay on record. Raises `NotFound`, `Invalid`."""
     before = queries.form(session, number)
     measurement = before.measurement
     evaluated = found_in(

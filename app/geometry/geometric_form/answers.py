@@ -24,7 +24,7 @@ class FormVerdictOut(BaseModel):
 
 
 class FormDeviationOut(BaseModel):
-    """A deviation by one method; uncertainty: expanded, k = 2, where it can be told."""
+    """A deviation by one method; uncertainty: expanded, k = 2, where it can be found."""
 
     method: Annotated[
         str, Field(description="minimum_zone, least_squares, printed, inscribed (MIC), circumscribed (MCC).")

@@ -88,7 +88,7 @@ def get_form_measurement(session: SessionDep, caller: AnyCaller, number: Number)
 
 @router.post("/forms/{number}/recompute", status_code=201, responses=problems(404))
 def recompute_form(session: SessionDep, caller: AnyCaller, number: Number, body: ReasonIn) -> FormOut:
-    """Evaluate the stored touches anew by the present code; what was found before stays on record."""
+    """Evaluate the stored touches again by the present code; what was found before stays on record."""
     caller.must_somewhere("operator")
     row = queries.form(session, number)
     caller.must_at(row.measurement.machine_id, "operator")

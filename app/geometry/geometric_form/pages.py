@@ -202,7 +202,7 @@ def form_page(
             for warning in warnings_of(
                 row.measurement.kind, row.measurement.given, row.evaluation.result, row.plausible_shift
             )
-            if warning.code != "touch_does_not_fit"  # suspected touches are told one by one
+            if warning.code != "touch_does_not_fit"  # suspected touches are reported one by one
         ],
         engine=ENGINE,
         wording=wording,
@@ -213,6 +213,6 @@ def form_page(
 
 @router.post("/forms/{form}/recompute")
 def recompute(session: SessionDep, caller: Operator, form: int) -> Response:
-    """Evaluate the stored touches anew."""
+    """Evaluate the stored touches again."""
     actions.recompute(session, form, _("computed again on the page"), caller)
     return RedirectResponse(f"/forms/{form}", 303)

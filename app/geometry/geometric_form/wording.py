@@ -43,7 +43,7 @@ def kinds() -> list[tuple[str, str]]:
 
 
 def method_word(method: str) -> str:
-    """By which rule a deviation is told."""
+    """The rule by which a deviation is judged."""
     return {
         "minimum_zone": _("Minimum zone"),
         "least_squares": _("Least squares"),

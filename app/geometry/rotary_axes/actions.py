@@ -1,6 +1,6 @@
 """Taking runs, confirming them, entering them on the control, putting a kinematics back. Lengths in mm, angles in degrees.
 
-Every verb locks the machine first: of two who enter at once one wins, and the other is told.
+Every verb locks the machine first: of two who enter at once one wins, and the other is informed.
 """
 
 from datetime import UTC, datetime
@@ -225,7 +225,7 @@ def _could_be(session: Session, run: KinematicsRun, at: datetime) -> None:
 def undo(session: Session, number: int, reason: str, caller: Caller) -> RunRow:
     """Take back what was entered because of a run: the kinematics before it is put back, as a new version.
 
-    Raises `NotFound`; `Conflict` when it was not entered, was undone, or something entered later stands on it.
+    Raises `NotFound`; `Conflict` when it was not entered, was undone, or something entered later is on it.
     """
     lock_machines(session, [queries.run(session, number).machine.id])
     row = queries.run(session, number)
@@ -281,7 +281,7 @@ def _decide(session: Session, run: KinematicsRun, what: str, reason: str, caller
 
 
 def recompute(session: Session, number: int) -> tuple[RunRow, Evaluated]:
-    """A run evaluated anew from what was sent, with the limits of then; what is on record stays as it is."""
+    """A run evaluated again from what was sent, with the limits of then; what is on record stays as it is."""
     row = queries.run(session, number)
     body = RunIn.model_validate({"machine": row.machine.key, **row.run.given})
     return row, evaluate(body, Limits(**row.run.limits))

@@ -197,7 +197,7 @@ def parameters_of(row: RunRow) -> dict[str, float | str]:
 
 
 class RecomputedOut(BaseModel):
-    """A run evaluated anew from what was sent. What is on record stays as it is."""
+    """A run evaluated again from what was sent. What is on record stays as it is."""
 
     run: int
     same: Annotated[bool, Field(description="It comes to what is on record.")]

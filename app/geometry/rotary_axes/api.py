@@ -131,7 +131,7 @@ def undo_kinematics_run(session: SessionDep, caller: Engineer, run: RunNumber, b
 
 @router.post("/kinematics/runs/{run}/recompute", responses=problems(404))
 def recompute_kinematics_run(session: SessionDep, caller: AnyCaller, run: RunNumber) -> RecomputedOut:
-    """Evaluate it anew from what was sent, and say whether that comes to what is on record; nothing is changed."""
+    """Evaluate it again from what was sent, and say whether that comes to what is on record; nothing is changed."""
     caller.must_somewhere("operator")
     _run(session, caller, run)
     row, evaluated = actions.recompute(session, run)

@@ -54,7 +54,7 @@ def of_parameters(read: Results, came_as: str) -> Evaluated:
 
 
 def _fill_in(evaluated: Evaluated, read: Results, axes: Mapping[AxisName, AxisProtocol]) -> None:
-    """Results that nothing is to be computed of: as they stand in parameters and protocol."""
+    """Results that nothing is to be computed of: as they are in parameters and protocol."""
     for axis in AXES:
         axis_protocol = axes.get(axis)
         errors: dict[str, float | None] = (

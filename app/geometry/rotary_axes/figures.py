@@ -1,7 +1,7 @@
 """Diagrams of rotary axes. Pure; mm and degrees in, µm on the axes.
 
 As in the control's protocol: measured red, optimised green, against the angle of the axis; here with shapes and words as
-well. Angles become what they come to over one metre, so that all position errors stand in one picture.
+well. Angles become what they come to over one metre, so that all position errors are in one picture.
 """
 
 from __future__ import annotations

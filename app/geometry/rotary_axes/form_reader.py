@@ -31,7 +31,7 @@ SIGNS = {"": None, "+": "positive", "-": "negative", "\N{MINUS SIGN}": "negative
 
 
 class Line(NamedTuple):
-    """A line of the grid or of what was pasted; where: the field of the form that it stands in."""
+    """A line of the grid or of what was pasted; where: the field of the form that it is in."""
 
     where: str
     number: int
@@ -125,7 +125,7 @@ def _cells(text: str) -> list[str]:
 def _axes(form: Mapping[str, str]) -> list[dict[str, Any]]:
     """Axis, angle and sign of a line stand for those below that leave them out.
 
-    Of an angle that stands on four lines or more, the lines are touches of the ball; else each is its centre.
+    Of an angle that is on four lines or more, the lines are touches of the ball; else each is its centre.
     """
     axis, angle, came = "C", None, None
     seen: dict[str, dict[tuple[float, str | None], list[list[float]]]] = {}

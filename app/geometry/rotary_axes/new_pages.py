@@ -70,7 +70,7 @@ def _form(
 
 @router.post("/kinematics/new")
 async def send(request: Request, session: SessionDep, caller: Operator) -> Response:
-    """`do`: look at it, draw the grid anew, or keep it. Whatever comes of it, all that was typed is still there."""
+    """`do`: look at it, draw the grid again, or keep it. Whatever comes of it, all that was typed is still there."""
     sent = await request.form()
     form = texts(sent)
     file = sent.get("file")

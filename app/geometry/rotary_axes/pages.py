@@ -141,7 +141,7 @@ def picture(chart: Picture) -> Markup:
 
 @router.post("/kinematics/runs/{run}/recompute")
 def recompute(request: Request, session: SessionDep, caller: Operator, run: int) -> Response:
-    """Evaluate it anew from what was sent, and say whether that comes to the same; nothing is changed."""
+    """Evaluate it again from what was sent, and say whether that comes to the same; nothing is changed."""
     row, evaluated = actions.recompute(session, run)
     alike = run_history.same(row.run.results, evaluated.results)
     same = _("Computed again from the data sent: the result is the same.")
@@ -179,7 +179,7 @@ def _ask_run(
 
 @router.post("/kinematics/runs/{run}/{what}")
 def decide(request: Request, session: SessionDep, caller: Operator, run: int, what: str, form: FormDep) -> Response:
-    """It is done, or who comes too late is told how it stands."""
+    """It is done, or who comes too late sees the state now."""
     on = OfRun(session, run, caller)
     verb = _verb(what, on)
     try:

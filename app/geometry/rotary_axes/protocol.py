@@ -44,7 +44,7 @@ MOST_NOTES = 40
 
 
 def protocol_of(row: RunRow, made_at: datetime) -> Report:
-    """The protocol, with its diagrams as they stand on the page."""
+    """The protocol, with its diagrams as they are on the page."""
     run, results, settings = row.run, surer(row.run.results), _settings(row)
     return Report(
         key=f"kinematics-{run.id}",

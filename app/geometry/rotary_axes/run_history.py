@@ -69,7 +69,7 @@ def machine_row(session: Session, machine: Machine) -> MachineRow:
 
 
 def as_measured(run: KinematicsRun, unrecorded: Mapping[str, float] | None = None) -> Measured:
-    """A run for the drift. unrecorded: what was entered on the control besides, which nobody has said here."""
+    """A run for the drift. unrecorded: what was entered on the control besides, without a record here."""
     more = unrecorded or {}
     results = surer(run.results)
     in_effect = run.in_effect | {name: run.in_effect.get(name, 0.0) + value for name, value in more.items()}

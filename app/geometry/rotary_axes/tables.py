@@ -66,7 +66,7 @@ class KinematicsBackup(Base):
     """The kinematics of a machine (with one of its heads) as it was from one moment on, as cycle 450 keeps it. Append-only.
 
     errors: what has been entered so far, summed up by name. run: the run that led to it; restores: the version that was
-    put back. since: runs measured from then on were measured on it; if nobody has said when it was entered, that is when
+    put back. since: runs measured from then on were measured on it; if the time of the entry is not known, that is when
     the last run was measured that was known by then.
     """
 

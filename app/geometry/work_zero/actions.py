@@ -74,7 +74,7 @@ def acknowledge(session: Session, zero: WorkZero, body: WarningsAcknowledgeIn, c
 
 
 def recompute(session: Session, zero: WorkZero, body: ZeroRecomputeIn, caller: Caller) -> WorkZero:
-    """The same touches once more; a new zero that stands in place of this one in the history of its fixture."""
+    """The same touches once more; a new zero that is in place of this one in the history of its fixture."""
     machine = session.get_one(Machine, zero.machine_id)
     lock_machines(session, [machine.id])
     later = queries.recomputed_as(session, zero)
@@ -153,7 +153,7 @@ def _fixture(session: Session, machine: Machine, key: str | None) -> Fixture | N
 
 
 def _watch(session: Session, machine: Machine, zero: WorkZero) -> list[dict[str, Any]]:
-    """Raise *fixture shifted*, or end it when the fixture is back; what live pages are told of it.
+    """Raise *fixture shifted*, or end it when the fixture is back; what live pages hear of it.
 
     The zero that was touched last tells. One that came in late or was computed again says nothing of today, but may take
     away what today's was too far from; one part in its place says nothing of another beside it, nor one axis of another.

@@ -180,7 +180,7 @@ def acknowledge_work_zero(
 def recompute_work_zero(session: SessionDep, caller: Operator, number: Number, body: ZeroRecomputeIn) -> ZeroOut:
     """Compute the same touches once more, with another tip or without some of them; the result is another work zero.
 
-    It stands in place of this one in the history of its fixture; readings that were made of this one stay as they are.
+    It is in place of this one in the history of its fixture; readings that were made of this one stay as they are.
     """
     zero = queries.work_zero(session, number)
     return zero_out(session, actions.recompute(session, zero, body, caller))

@@ -114,7 +114,7 @@ def settings_of(session: Session, machine_id: int, key: str) -> Fixture:
 
 
 def _standing(machine_id: int, fixture: str) -> Select[WorkZero]:
-    """The zeros of a fixture that count: one computed again stands in place of the first, touched at the same time."""
+    """The zeros of a fixture that count: one computed again is in place of the first, touched at the same time."""
     later = aliased(WorkZero)
     again = select(later.id).where(later.machine_id == WorkZero.machine_id, later.recomputed_from == WorkZero.id)
     return select(WorkZero).where(WorkZero.machine_id == machine_id, WorkZero.fixture == fixture, ~again.exists())

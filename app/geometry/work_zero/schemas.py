@@ -40,7 +40,7 @@ class EdgePointIn(Body):
 class ZeroIn(Body):
     """The touches of a bore, boss, pocket, web or corner, in the machine's coordinates.
 
-    `records` may stand in place of `touches`, or what the printed macros keep: `R1` to `R4`, or `#501`, `#502`, `#504`, `#505`.
+    `records` may be in place of `touches`, or what the printed macros keep: `R1` to `R4`, or `#501`, `#502`, `#504`, `#505`.
     """
 
     machine: Annotated[Slug, Field(description="The key of the machine.")]

@@ -244,7 +244,7 @@ def _sister_tool(session: Session, row: AlarmRow, comment: str, caller: Caller) 
 def _offset_set(
     session: Session, row: AlarmRow, comment: str, caller: Caller, offset: float | None, changed_by: str | None
 ) -> Outcome:
-    """The true offset, as a manual edit; one that was told by hand since the alarm was last raised needs no other."""
+    """The true offset, as a manual edit; one that was entered by hand since the alarm was last raised needs no other."""
     number = row.alarm.tool_memory
     assert number is not None
     tool = offset_queries.tool(session, row.machine, number)

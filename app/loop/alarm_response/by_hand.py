@@ -27,7 +27,7 @@ class ByHand(NamedTuple):
 
 
 def keep(session: Session, row: AlarmRow, found: ByHand, comment: str, caller: Caller) -> list[dict[str, Any]]:
-    """Keep it beside the reading; the reading is neither excluded nor decided anew. What followed, for the outcome.
+    """Keep it beside the reading; the reading is neither excluded nor decided again. What followed, for the outcome.
 
     Raises `Invalid` for an alarm that no reading has raised, a reading that is not behind it, or nothing said.
     """

@@ -106,7 +106,7 @@ def _filtered(
 def history(
     session: Session, *, machine_id: int | None = None, holding: str = "", before: int | None = None, limit: int = 50
 ) -> list[AlarmRow]:
-    """All alarms, newest first. holding: those in whose kind, names, comment or acknowledging person these words stand."""
+    """All alarms, newest first. holding: those in whose kind, names, comment or acknowledging person these words are found."""
     query = _filtered("all", machine_id)
     names = (Machine.name, Machine.key, Characteristic.name, Characteristic.key, Alarm.comment, Alarm.acknowledged_by)
     words = {kind.name: kind.word() for kind in kinds()}

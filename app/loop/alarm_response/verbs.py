@@ -30,7 +30,7 @@ class OfAlarm:
 
 
 def acknowledge_alarm(on: OfAlarm, given: AlarmAcknowledgeIn) -> AlarmRow:
-    """Say what the alarm was; what follows from that follows at once and stands in `outcome`.
+    """Say what the alarm was; what follows from that follows at once and is in `outcome`.
 
     - `tool_replaced`: open corrections of the tool are superseded, its averages and its life begin again, with `offset`
     - `keep_cutting`: the held correction is released to the machine
@@ -41,7 +41,7 @@ def acknowledge_alarm(on: OfAlarm, given: AlarmAcknowledgeIn) -> AlarmRow:
     - `noted`: nothing else; at *offset differs* the reported offset is true
 
     What was measured by hand (`hand_measured`, `hand_verdict`) is kept beside the machine's value of the last reading behind
-    the alarm, or of `hand_sequence`; that reading is neither excluded nor decided anew.
+    the alarm, or of `hand_sequence`; that reading is neither excluded nor decided again.
 
     After a probe fault the paused characteristic goes on, after *offset differs* the paused tool, whichever it was. Acknowledging twice is 409 and says who was
     first.

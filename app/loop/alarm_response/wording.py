@@ -33,7 +33,7 @@ def what_to_do(kind: str) -> str:
 
 
 def action_word(action: str) -> str:
-    """Return an action as it stands on its button."""
+    """Return an action as it is on its button."""
     return {
         "tool_replaced": _("Tool replaced"),
         "keep_cutting": _("Keep cutting"),

@@ -28,7 +28,7 @@ def _tool_worn(alarm: Alarm) -> str:
 
 
 def _not_accepted(alarm: Alarm) -> str:
-    if "m" not in alarm.data:  # raised before sections were told
+    if "m" not in alarm.data:  # raised before sections were named
         return _("Too many sections of the part are out of tolerance: it is not accepted.")
     return _("At least {least} of {m} sections lie outside the tolerance: the part is not accepted.").format(
         least=alarm.data.get("least"), m=alarm.data["m"]

@@ -92,7 +92,7 @@ def place_page(
     done: Word = None,
     n: Number = None,
 ) -> Response:
-    """One place: how it stands, its history, the pairs, and the forms."""
+    """One place: its state, its history, the pairs, and the forms."""
     message = verbs.done(done, n) if done else None
     return _place(request, session, caller, machine, _of(memory, location), before=before, said=message)
 
@@ -258,7 +258,7 @@ def confirm(
     number: int,
     form: FormDep,
 ) -> Response:
-    """It is done, or who comes too late is told how it stands."""
+    """It is done, or who comes too late sees the state now."""
     on = OfPlace(session, machine_named(session, machine), _of(memory, location), number, caller)
     verb = _verb(what, on)
     try:

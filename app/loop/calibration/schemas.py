@@ -55,7 +55,7 @@ def _by_number(value: Any, names: dict[str, str]) -> Any:
 
 
 def _schema_with(numbers: dict[str, str], more: dict[str, str]) -> Callable[[dict[str, Any]], None]:
-    """Return what adds the numbers that may stand in place of names to a schema; either of the two is needed then.
+    """Return what adds the numbers that may be in place of names to a schema; either of the two is needed then.
 
     more: numbers without a name of their own, and their meaning.
     """
@@ -66,7 +66,7 @@ def _schema_with(numbers: dict[str, str], more: dict[str, str]) -> Callable[[dic
             codes = R_CODES.get(number)
             types = [{"type": "integer"}, {"type": "string"}, {"type": "null"}]
             kind = {"anyOf": types} if codes else dict(properties[name])
-            kind.pop("default", None)  # stands at the name
+            kind.pop("default", None)  # is at the name
             words = ": " + ", ".join(f"{code} is {choice}" for code, choice in codes.items()) if codes else ""
             properties[number] = kind | {"description": f"The same as `{name}`{words}."}
         for number, words in more.items():
@@ -77,7 +77,7 @@ def _schema_with(numbers: dict[str, str], more: dict[str, str]) -> Callable[[dic
 
 
 class GaugeIn(Body):
-    """A calibration against a gauge of known size, as L92 makes it. R numbers may stand in place of names (`"R33": 0.001`).
+    """A calibration against a gauge of known size, as L92 makes it. R numbers may be in place of names (`"R33": 0.001`).
 
     Needed, by name or number, are R11, R32, R33, R34, R36.
     """
@@ -155,7 +155,7 @@ class RingSectionIn(Body):
 class RingIn(Body):
     """A calibration in a ring on the spindle, as the macro of the lathe line makes it.
 
-    The macro's variables may stand in place of names (`"#502": 6.0`); nominal, both deviations and the tip are needed.
+    The macro's variables may be in place of names (`"#502": 6.0`); nominal, both deviations and the tip are needed.
     """
 
     model_config = ConfigDict(json_schema_extra=_schema_with(MACRO_NAMES, {}))

@@ -238,7 +238,7 @@ def what_pairs_say(found: Comparison, empirical_value: float) -> str:
 
 
 def place_words(place: Place) -> str:
-    """A place as it stands in a sentence."""
+    """A place as it is in a sentence."""
     if place.memory == "tool":
         return _("probe offset R10 = {location}").format(location=place.location)
     return _("empirical value R11 = {location}").format(location=place.location)

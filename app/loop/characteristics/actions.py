@@ -238,7 +238,7 @@ def _refuse_stale(current: CurrentCharacteristic, expected: int | None) -> None:
 def _change_parameters(
     session: Session, current: CurrentCharacteristic, given: Mapping[str, Any], reason: str | None, actor: str
 ) -> tuple[CurrentCharacteristic, list[dict[str, Any]]]:
-    """Under the machine's lock. Returns how things stand now, and what to tell everybody."""
+    """Under the machine's lock. Returns the state now, and what to tell everybody."""
     characteristic, machine, version, mapped = current
     changed = merged(version.parameters, given)
     errors = refusals(changed, machine)

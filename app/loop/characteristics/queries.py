@@ -21,7 +21,7 @@ from app.web.fields import is_slug
 
 
 class CurrentCharacteristic(NamedTuple):
-    """A characteristic as it stands now. mapped: what the machine's bridge may write to; None without a bridge."""
+    """A characteristic as it is now. mapped: what the machine's bridge may write to; None without a bridge."""
 
     characteristic: Characteristic
     machine: Machine
@@ -124,7 +124,7 @@ def characteristics(
 ) -> list[CurrentCharacteristic]:
     """Characteristics of one machine or of all, by key or by another one of `ORDERS`, the largest first after a minus.
 
-    `named`: those in whose name, key, part or machine these words stand.
+    `named`: those in whose name, key, part or machine these words are found.
     """
     order = ORDERS[by.removeprefix("-")]
     query = _CURRENT.where(Characteristic.key > after).offset(skip).limit(limit)

@@ -69,7 +69,7 @@ def _under_r_numbers(properties: Mapping[str, Any]) -> dict[str, Any]:
         if field.r is None:
             continue
         schema = dict(properties[field.name])
-        schema.pop("default", None)  # stands at the name
+        schema.pop("default", None)  # is at the name
         words = f"The same as `{field.name}`"
         if field.codes:
             schema = {"type": ["integer", "string", "null"]}
@@ -119,7 +119,7 @@ class CharacteristicChange(Body):
 
 
 class CharacteristicOut(BaseModel):
-    """A characteristic as it stands."""
+    """A characteristic as it is."""
 
     key: str
     name: str

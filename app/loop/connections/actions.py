@@ -38,7 +38,7 @@ class Beat(NamedTuple):
 def take_heartbeat(
     session: Session, machine: str, beat: HeartbeatIn, caller: Caller, *, silent_after: float, backlog_after: float
 ) -> Beat:
-    """Keep what a bridge tells of itself, in place of what it told before.
+    """Keep what a bridge tells of itself, in place of what it reported before.
 
     An event is published only when what people look at has changed: the state, the hold, the quarantine, or that it was
     silent or backs up. silent_after, backlog_after: s. Raises `NotFound`; `NotAllowed` for the key of another machine.

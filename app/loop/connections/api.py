@@ -22,7 +22,7 @@ router = api_router("connections")
 def take_heartbeat(
     request: Request, session: DoorSessionDep, caller: AnyCaller, machine: MachineKey, heartbeat: HeartbeatIn
 ) -> HeartbeatOut:
-    """A bridge says, every ten seconds, that it lives and how it stands with this machine. The answer tells where the
+    """A bridge says, every ten seconds, that it lives and the state of this machine. The answer tells where the
     server's database stands: one that was restored or has failed over may lack readings that it had stored; and which touch
     test is open.
     """
@@ -62,7 +62,7 @@ def get_connection(request: Request, session: SessionDep, caller: AnyCaller, mac
 @router.delete("/machines/{machine}/connection", status_code=204, responses=problems(404))
 def remove_connection(session: SessionDep, caller: Admin, machine: MachineKey) -> Response:
     """Forget the connection of a machine that has no bridge any more, and end its alarms. Doing it twice is harmless; a
-    bridge that still speaks makes it anew.
+    bridge that still speaks makes it again.
     """
     actions.remove_connection(session, machine, caller)
     return Response(status_code=204)

@@ -81,7 +81,7 @@ def _due(session: Session, silent_after: timedelta) -> Select[Any]:
     """Return the kinds that are to be raised or ended, and at which machine.
 
     Nothing is said of silence unless this job ran a short while ago and the bridge was not heard since: while the server or
-    its database is away, no bridge can be heard.
+    its database is unreachable, no bridge can be heard.
     """
     run = job_runs.runs(session).get(NAME)
     silent = Connection.received_at < func.clock_timestamp() - silent_after

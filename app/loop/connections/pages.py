@@ -27,7 +27,7 @@ def _silent_after(request: Request) -> timedelta:
 
 @router.get("/connections", dependencies=[require("viewer")])
 def connections_page(request: Request, session: SessionDep, after: Word = None, q: Sought = "") -> Response:
-    """Every machine that has or had a bridge, and how it stands."""
+    """Every machine that has or had a bridge, and its state."""
     rows = queries.connections(session, after or "", ON_PAGE + 1, holding=q)
     link = partial(address, "/connections", q=q or None)
     return page(

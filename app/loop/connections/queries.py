@@ -73,7 +73,7 @@ def connections(
 ) -> Sequence[ConnectionRow]:
     """The connections by the key of their machine; ``only`` this one for the key of a machine.
 
-    ``holding``: those in whose machine, kind, version or last error these words stand.
+    ``holding``: those in whose machine, kind, version or last error these words are found.
     """
     names = (Machine.name, Machine.key, Connection.kind, Connection.version, Connection.error)
     query = _rows().where(*holds_words(holding, *names)).where(Machine.key > after).order_by(Machine.key).limit(limit)

@@ -177,7 +177,7 @@ class HeldBackOut(BaseModel):
 
 
 class ConnectionOut(BaseModel):
-    """The connection of one machine, as its bridge told it last."""
+    """The connection of one machine, as its bridge reported it last."""
 
     machine: str
     name: Annotated[str, Field(description="What people call the machine.")]

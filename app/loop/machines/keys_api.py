@@ -19,7 +19,7 @@ KeyId = Annotated[int, Path(ge=1, le=LARGEST_SERIAL, description="The number of 
 
 @router.post("/machines/{machine}/keys", status_code=201, responses=problems(404))
 def make_machine_key(session: SessionDep, caller: Engineer, machine: MachineKey, key: MachineKeyIn) -> NewKeyOut:
-    """A key with which this machine pushes readings and handles its corrections. The secret is told this once."""
+    """A key with which this machine pushes readings and handles its corrections. The secret is shown only this once."""
     created = add_key(session, machine=machines.machine_named(session, machine).key, name=key.name, actor=caller.name)
     return NewKeyOut(id=created.id, name=key.name, secret=created.secret)
 

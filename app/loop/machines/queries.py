@@ -71,7 +71,7 @@ def hold_machine(session: Session, given: Mapping[str, Any]) -> None:
 def lock_machines(session: Session, machine_ids: Iterable[int]) -> dict[int, MachineState]:
     """Hold these machines until the transaction ends, always in the same order, and return their states.
 
-    Whoever changes anything of a machine (readings, corrections, tools, averages, alarms, parameters) does this first.
+    Anyone who changes anything of a machine (readings, corrections, tools, averages, alarms, parameters) does this first.
     It moves the versions of the machines: what the writers of readings remember of them is not true any more.
     """
     states = session.scalars(

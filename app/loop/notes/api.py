@@ -20,7 +20,7 @@ Number = Annotated[int, Path(ge=1, le=LARGEST_ID, description="Number of the not
 
 @router.post("/notes", status_code=201, responses=problems(404, 409) | {200: {"model": WrittenNote}})
 def write_note(session: SessionDep, caller: Operator, note: NoteIn, response: Response) -> WrittenNote:
-    """Write a note at a characteristic or at a machine: from then on it stands on every chart there, at its moment.
+    """Write a note at a characteristic or at a machine: from then on it is on every chart there, at its moment.
 
     201; 200 where it was sent before with the same key.
     """

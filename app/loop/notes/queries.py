@@ -78,7 +78,7 @@ def notes(
     """Notes, the last written first.
 
     characteristic: those on its charts, its machine's too. period: of the moments that they are about. named: those whose
-    text holds this. holding: those in whose text, author or name of what they are about these words stand. withdrawn: these as well.
+    text holds this. holding: those in whose text, author or name of what they are about these words are found. withdrawn: these as well.
     """
     query = _ROWS.order_by(Note.id.desc()).limit(limit)
     if machine_id is not None:

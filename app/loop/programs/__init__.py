@@ -1,1 +1,1 @@
-"""Program text: what stands in the machines' programs made into characteristics, and characteristics and corrections written for them."""
+"""Program text: what is in the machines' programs made into characteristics, and characteristics and corrections written for them."""

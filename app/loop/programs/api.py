@@ -91,7 +91,7 @@ def write_program(
 ) -> Response:
     """The measuring or the calibration subprogram of a characteristic. Read back it gives the same parameters.
 
-    What R numbers cannot say (factor, mode, acceptance …) stands in comments such as `(INBAND FACTOR=-1)`. With `ring` the
+    What R numbers cannot say (factor, mode, acceptance …) is in comments such as `(INBAND FACTOR=-1)`. With `ring` the
     programs that send readings to the bridge and take corrections from it.
     """
     current = characteristics.characteristic_for(session, caller, characteristic, "viewer")

@@ -147,7 +147,7 @@ def program_of(
 ) -> str:
     """The measuring program of a characteristic, or the calibration for its axis, direction and memory location.
 
-    gauge: size of the gauge or ring, R32 or #505, mm; without it the target stands there, and the text says so.
+    gauge: size of the gauge or ring, R32 or #505, mm; without it the target is there, and the text says so.
     """
     characteristic, parameters = current.characteristic, current.parameters
     about = {"characteristic": characteristic.key, "name": characteristic.name, "part": characteristic.part or ""}

@@ -39,7 +39,7 @@ def exclude(session: Session, entry: Entry, sequence: int, actor: str, reason: s
     Raises `NotFound`, and `Conflict` when it has been excluded already, saying by whom.
     """
     queries.record_of(session, entry, sequence)
-    lock_machines(session, [entry.machine_id])  # before the first row, as whoever acknowledges an alarm does
+    lock_machines(session, [entry.machine_id])  # before the first row, as an acknowledgement does
     exclusion: Exclusion | None = session.scalar(
         insert(Exclusion)
         .values(
@@ -143,7 +143,7 @@ NOT_OF_LEVEL = (
 
 
 def _forget_level(session: Session, entry: Entry, sequences: Sequence[int]) -> None:
-    """A level that readings taken out have made is not believed any more: the next reading begins it anew.
+    """A level that readings taken out have made is not believed any more: the next reading begins it again.
 
     The machine is locked.
     """

@@ -87,7 +87,7 @@ def _here(request: Request) -> tuple[Directory, Writer, Database]:
 async def push_reading(request: Request, caller: AnyCaller) -> Response:
     """Push one reading; the answer is given after the commit and says what was decided and why.
 
-    `touches` may stand in place of `measured`: one list per point, each with its repeats. `correction_in_effect` is the
+    `touches` may be in place of `measured`: one list per point, each with its repeats. `correction_in_effect` is the
     number of the last correction that the machine had applied when it cut this part; `machined_at` may say it by time.
     """
     reading = await decoded(await request.body())

@@ -67,7 +67,7 @@ def write_aqdef(
     if len(keys) > MOST:
         raise Invalid.at("characteristic", _("at most {most} go into one file").format(most=MOST))
     chosen = [characteristics.characteristic_named(session, key) for key in dict.fromkeys(keys)]
-    # Characteristics of one part stand together, as the file has them.
+    # Characteristics of one part are together, as the file has them.
     chosen.sort(key=lambda each: (each.characteristic.part or "", each.machine.id, each.characteristic.id))
     parts = list(dict.fromkeys(_part(each) for each in chosen))
     described = [_described(each, parts.index(_part(each))) for each in chosen]

@@ -112,7 +112,7 @@ def rows(
         before = session.scalar(newest)
         if before is not None:
             query = query.where(Reading.sequence > before)
-    # Whoever reads the file may be slow.
+    # Anyone who reads the file may be slow.
     session.execute(text("SET LOCAL idle_in_transaction_session_timeout = 0"))
     targets: dict[int, float] = {}
     with session.execute(query.execution_options(yield_per=AT_ONCE)) as fetched:  # closed too where the file is cut off

@@ -11,7 +11,7 @@ from uuid import UUID
 COLUMNS = ("sequence", "received_at", "parameters_version")
 """A table with all of these was written by Inband."""
 EMPIRICAL = "empirical value, mm"
-"""Process parameter of AQDEF: what was taken off the measured size, so that the corrected one stands in the file."""
+"""Process parameter of AQDEF: what was taken off the measured size, so that the corrected one is in the file."""
 SAME = 2e-9
 """mm; sizes that differ by less are one that was rounded on its way."""
 _MARK = 0x2A2BAD  # 22 bits that tell such a GUID from those of others

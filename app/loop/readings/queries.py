@@ -67,7 +67,7 @@ def entries_for_results(
 ) -> dict[str, Entry]:
     """The characteristics that results are to become, by result. Raises `Invalid` for one that this machine has not.
 
-    field: where a result's characteristic stands in what was sent.
+    field: where a result's characteristic is in what was sent.
     """
     entries: dict[str, Entry] = {}
     errors = []

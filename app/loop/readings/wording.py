@@ -60,7 +60,7 @@ def _notes(record: Record, parameters: Parameters, amount: float | None) -> tupl
 
 
 def empirical_value(record: Record, parameters: Parameters) -> float:
-    """Return what was taken off the measurement, mm; it can be told from what is stored: D = measured - target - EV."""
+    """Return what was taken off the measurement, mm; it can be found from what is stored: D = measured - target - EV."""
     return record.measured - parameters.target - record.deviation
 
 

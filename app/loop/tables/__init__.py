@@ -1,1 +1,1 @@
-"""Tables of the loop: one schema under one lock per machine, so they stand together and below its rooms."""
+"""Tables of the loop: one schema under one lock per machine, so they are together and below its rooms."""

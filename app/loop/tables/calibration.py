@@ -38,11 +38,11 @@ class CalibrationRecord(Base):
     key: Mapped[str | None]
     outcome: Mapped[str]
     refused: Mapped[bool]
-    settings: Mapped[dict[str, Any]]  # what it was told: limits, repeats, axis, the ring's limits
+    settings: Mapped[dict[str, Any]]  # what was set for it: limits, repeats, axis, the ring's limits
     touches: Mapped[list[Any]]
     size: Mapped[float | None]  # R42
     measured: Mapped[float | None]  # R43
-    difference: Mapped[float | None]  # R44; of a ring, what the probe stands beside the spindle; of pairs, their mean
+    difference: Mapped[float | None]  # R44; of a ring, what the probe is beside the spindle; of pairs, their mean
     average: Mapped[float | None]  # R49
     value_before: Mapped[float]  # empirical value or offset that was in effect
     proposed: Mapped[float | None]  # what it is to become; None: nothing is to be changed

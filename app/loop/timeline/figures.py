@@ -138,7 +138,7 @@ def _marks(events: Sequence[Event], span: tuple[float, float], pixels: float) ->
 def _rows(marks: Sequence[tuple[_Mark, float]], most: float) -> list[tuple[_Mark, float, _Side]]:
     """Each mark with its row and the side on which its word is written: two rows, and a word gives way to the next mark's shape.
 
-    most: pixels from the left that a word may reach; beside a mark near the end it stands on the left, if there is room.
+    most: pixels from the left that a word may reach; beside a mark near the end it is on the left, if there is room.
     """
     places: list[tuple[_Mark, float, _Side]] = []
     latest = {UPPER: -1, LOWER: -1}  # index of the last mark in the row

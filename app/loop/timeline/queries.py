@@ -62,7 +62,7 @@ def with_events_of_machine(
     """A chart over time with the events of the machine above it: alarms, calibrations, tool changes, notes.
 
     width: in pixels, about. tool: only of this one. place: memory and location that the chart is about; alarms that name
-    another one stand there. without: kinds that the chart draws itself.
+    another one are there. without: kinds that the chart draws itself.
     """
     span = span_of(chart)
     if span is None:
@@ -100,7 +100,7 @@ def events_in(session: Session, current: CurrentCharacteristic, period: Period) 
 def events_by_reading(session: Session, current: CurrentCharacteristic, first: int, last: int) -> list[Event]:
     """The same at the numbers of readings: an alarm at the one that raised it, all else at the first that came after it.
 
-    What came after the newest reading stands at the number that the next one will have. Of very many readings the place is
+    What came after the newest reading is at the number that the next one will have. Of very many readings the place is
     exact to as much as a chart can show.
     """
     newest = session.scalar(

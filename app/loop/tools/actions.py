@@ -47,7 +47,7 @@ class Decided(NamedTuple):
 
 
 class Restarted(NamedTuple):
-    """A tool whose offset was set anew; open corrections fell, averages began again."""
+    """A tool whose offset was set again; open corrections fell, averages began again."""
 
     tool: Tool
     superseded: list[int]
@@ -68,7 +68,7 @@ def decide(
     """Reject a correction that is not applied yet, approve one that awaits it, or release a held one.
 
     Raises `NotFound`; `Conflict` when the correction's status does not permit it, or when a program text with it is out in
-    the world and nobody has said that it is to be rejected nevertheless.
+    the world and its rejection was not demanded nevertheless.
     """
     correction = locked(session, machine, number)
     must_be(correction, machine, verb, FROM[verb])
@@ -105,7 +105,7 @@ def approve_all(
 ) -> list[Correction]:
     """Approve these corrections together: all of them, or none when one cannot be approved any more.
 
-    Raises `NotFound`; `Conflict` naming the first that somebody else has decided about, and how it stands.
+    Raises `NotFound`; `Conflict` naming the first that somebody else has decided about, and its state.
     """
     lock_machines(session, [machine.id])
     approved = [queries.correction(session, machine, number) for number in sorted(set(numbers))]

@@ -81,7 +81,7 @@ def mark_applied(
         pending.mapping = mapping
         if pending is not together[-1]:
             _step(session, machine, tool, pending.number, before, tool.offset, at, caller)
-        if caller.kind != "machine":  # what a machine does all day stands in the history of its tools
+        if caller.kind != "machine":  # what a machine does all day is in the history of its tools
             record_status(session, machine, pending, caller, "correction applied", "pending", None)
     reported = tool.offset if offset_after is None else offset_after
     return _reported(session, machine, together, tool, caller, reported, tool.offset, before, at)

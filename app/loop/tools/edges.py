@@ -18,7 +18,7 @@ from app.loop.tools.events import tool_changed
 
 
 def describe_tool(session: Session, machine: Machine, number: int, settings: ToolSettings, caller: Caller) -> Tool:
-    """Say what is in this location; what is left out stays. A new plan is told again when it is reached.
+    """Say what is in this location; what is left out stays. A new plan is reported again when it is reached.
 
     Raises `NotFound`, and `Invalid` for a tool that is its own sister, or that the machine has not.
     """

@@ -30,7 +30,7 @@ class OffsetChange:
 
 def offset_figure(changes: Sequence[OffsetChange]) -> Chart:
     """The offset over time as steps; every change a mark by its kind; tool changes as lines through the chart."""
-    changes = sorted(changes, key=lambda change: change.at)  # what is told late would draw a line back in time
+    changes = sorted(changes, key=lambda change: change.at)  # what is reported late would draw a line back in time
     if not changes:
         return nothing(_("No correction or tool change yet"))
     kinds = {

@@ -1,4 +1,4 @@
-"""Tool memory, average memory and corrections as they stand. Never writes. Lengths in mm."""
+"""Tool memory, average memory and corrections as they are. Never writes. Lengths in mm."""
 
 from collections import defaultdict
 from collections.abc import Iterable, Sequence

@@ -46,7 +46,7 @@ def corrections_page(
 ) -> Response:
     """The text with copy, download and what to say about it; with ``do=applied`` it asks for the second touch.
 
-    shown: check sum of the text that is on the screen; the page says whether another one stands there by now.
+    shown: check sum of the text that is on the screen; the page says whether another one is there by now.
     """
     machine_row = machine_named(session, machine)
     handed = fetching.pending_text(session, machine_row, form)

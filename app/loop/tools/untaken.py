@@ -2,7 +2,7 @@
 
 Parts go on being cut with the offset of before, and each further correction is decided as if the earlier ones were in it. It
 shows by what a bridge says that it holds back, by corrections in a row of one characteristic, or by parts that were measured
-long after the correction. What waited while the server itself was away is not held against the machine.
+long after the correction. What waited while the server itself was unreachable is not held against the machine.
 """
 
 import time
@@ -28,7 +28,7 @@ from app.loop.tools.events import alarm_raised
 
 NAME = "corrections_not_taken"
 ACTOR = "inband"
-LATELY = 300.0  # s without a run of the job: the server was away
+LATELY = 300.0  # s without a run of the job: the server was unreachable
 SETTLES = timedelta(minutes=5)
 """Time that a machine has for corrections in a row: as many may come at once, when a backlog of readings arrives."""
 

@@ -38,7 +38,7 @@ def has_expired(correction: Correction) -> bool:
 
 
 def status_word(status: str) -> str:
-    """A correction's status as it stands inside a sentence."""
+    """A correction's status as it is inside a sentence."""
     return {
         "held": _("held"),
         "awaiting_approval": _("awaiting approval"),

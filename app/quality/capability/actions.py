@@ -14,7 +14,7 @@ from app.quality.capability.verdict_queries import DUE_AFTER, DUE_SHARE, is_olde
 
 
 def due(session: Session) -> list[Unit]:
-    """Characteristics whose index is to be worked out anew: of new readings, or by something else than before."""
+    """Characteristics whose index is to be worked out again: of new readings, or by something else than before."""
     now = datetime.now(UTC)
     return [
         Unit(f"characteristic/{state.key}", (state.key,), state.machine_id, state.characteristic_id)

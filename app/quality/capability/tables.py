@@ -12,7 +12,7 @@ class CapabilityVerdict(Base):
     """The index that may be quoted of the last readings (`app.core.spc.quoting.Quoting`), and of which readings it is.
 
     At most two of each characteristic: the last that could be quoted, and, where the newest readings carry none, the reason.
-    It is a note, no state that readings are decided by: written without the machine's lock, and made anew at any time.
+    It is a note, no state that readings are decided by: written without the machine's lock, and made again at any time.
     """
 
     __tablename__ = "capability_verdict"

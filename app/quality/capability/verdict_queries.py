@@ -18,7 +18,7 @@ from app.quality.capability.queries import USUAL, Judgement, judgement_of
 from app.quality.capability.tables import CapabilityVerdict
 
 DUE_SHARE, DUE_AFTER = 0.02, timedelta(minutes=10)
-"""The job works an index out anew after so many new readings, as a share of those it is of, or after so long with any."""
+"""The job works an index out again after so many new readings, as a share of those it is of, or after so long with any."""
 OLD_SHARE, OLD_AFTER = 0.04, timedelta(hours=1)
 """Beyond these an index is worked out on the spot, of so many characteristics at most; others show what is stored."""
 MOST_ON_THE_SPOT = 25

@@ -1,7 +1,7 @@
 """Range of the axis of a control chart, and the marks for points that lie far beyond it. Pure; µm.
 
 One broken insert at +400 µm would press limits of ±3 µm into a line. So the axis shows the limits and what lies about them; points
-beyond stand at its edge as open triangles with their value, and the line to them leaves the chart.
+beyond are at its edge as open triangles with their value, and the line to them leaves the chart.
 """
 
 from typing import Any

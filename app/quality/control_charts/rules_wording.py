@@ -175,5 +175,5 @@ def at(place: Place) -> str:
 
 
 def as_recorded(rules: Rules) -> dict[str, Any]:
-    """Rules as they stand in the record of changes."""
+    """Rules as they are in the record of changes."""
     return {place.value: {name.value: setting.do.value for name, setting in rules[place].items()} for place in rules}

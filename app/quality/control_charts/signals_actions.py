@@ -85,7 +85,7 @@ def look_at(session: Session, unit: Unit) -> None:
     changes = [_news(current, max(result.touched))] if result.touched else []
     if result.alarming:
         changes.append(raise_alarm(session, current, result.alarming))
-    # After the machine's lock was taken, as whoever acknowledges them takes it first.
+    # After the machine's lock was taken, as an acknowledgement takes it first.
     extend_alarms(session, result.grown)
     if changes:
         publish(session, *changes)

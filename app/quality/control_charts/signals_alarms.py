@@ -56,7 +56,7 @@ def _same(one: dict[str, Any], other: dict[str, Any]) -> bool:
 
 
 def _single(entries: Sequence[dict[str, Any]]) -> list[int]:
-    """The reading that may be a false one: where all that is told of is one point beyond the limits."""
+    """The reading that may be a false one: where all that is reported is one point beyond the limits."""
     if len(entries) != 1 or entries[0]["points"] != 1 or entries[0].get("runs", 1) != 1:
         return []
     told_of_reading = (entries[0]["chart"], entries[0]["rule"]) == (Chart.INDIVIDUALS, RuleName.NELSON_1)

@@ -275,7 +275,7 @@ def send_correction(request: Request, session: SessionDep, caller: Engineer, num
     except InbandError as error:
         if not error.errors:
             raise
-        if isinstance(error, Conflict):  # who was told may store it all the same
+        if isinstance(error, Conflict):  # who was informed may store it all the same
             typed |= {"seen_revision": str(queries.study(session, number).newest)}
         return _form(request, session, kind, typed, _grid_or_none(kind, typed), error=error, study=row)
     return RedirectResponse(f"/gauges/{number}?done=corrected", 303)

@@ -29,14 +29,14 @@ from app.quality.gauge_studies.evaluation import Evaluation, evaluate, inches_in
 from app.quality.gauge_studies.tables import GaugeStudy, GaugeStudyRevision
 from app.web.fields import LARGEST_ID
 
-LOOKED_BACK = 400  # readings from which the scatter from part to part is told
+LOOKED_BACK = 400  # readings that show the scatter from part to part
 LOOKED_AT = 10  # newest studies among which one is looked for that speaks of R33
 MOST_TAKEN = 1_000  # readings that a study may be made of
 
 
 @dataclass(frozen=True)
 class StudyRow:
-    """A study as it stands: newest revision, or the one that was asked for."""
+    """A study as it is: newest revision, or the one that was asked for."""
 
     study: GaugeStudy
     revision: GaugeStudyRevision
@@ -142,7 +142,7 @@ def studies(
 ) -> list[StudyRow]:
     """Studies, newest first; of one machine or of one characteristic.
 
-    holding: those in whose kind, gauge, names or author these words stand. kinds: what each kind is called.
+    holding: those in whose kind, gauge, names or author these words are found. kinds: what each kind is called.
     """
     query = _rows().where(GaugeStudyRevision.revision == _NEWEST).order_by(GaugeStudy.id.desc()).limit(limit)
     if machine_id is not None:

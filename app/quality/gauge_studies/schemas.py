@@ -101,7 +101,7 @@ class FromReadingsIn(SettingsIn):
 
 
 class CorrectionIn(SettingsIn):
-    """A study put right: settings and all values anew, and why. The revision before stays on record."""
+    """A study put right: settings and all values again, and why. The revision before stays on record."""
 
     rows: Rows
     reason: Reason

@@ -32,7 +32,7 @@ class GaugeStudy(Base):
 
 
 class GaugeStudyRevision(Base):
-    """A study as it stood from one moment on. settings: gauge, reference, tolerance …; rows: the values, cell by cell, mm."""
+    """A study as it was from one moment on. settings: gauge, reference, tolerance …; rows: the values, cell by cell, mm."""
 
     __tablename__ = "gauge_study_revision"
     __table_args__ = (ForeignKeyConstraint(["machine_id", "study_id"], ["gauge_study.machine_id", "gauge_study.id"]),)

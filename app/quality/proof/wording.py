@@ -58,7 +58,7 @@ def topics() -> dict[str, tuple[str, tuple[str, ...]]]:
 
 
 def number(value: float | bool | None) -> str:
-    """A number with the digits that can be told apart at the tolerances in use."""
+    """A number with the digits that can be distinguished at the tolerances in use."""
     if value is None:
         return "–"
     if isinstance(value, bool):

@@ -51,7 +51,7 @@ def look_ahead(session: Session, unit: Unit) -> None:
 
 
 def _tell(session: Session, current: CurrentCharacteristic, hunting: Hunting) -> dict[str, Any]:
-    """Raise the alarm: under the machine's lock, as whoever acknowledges the one before it. What is told to live pages."""
+    """Raise the alarm: under the machine's lock, as an acknowledgement of the one before it. The news for live pages."""
     alarm = alarms.raise_for_characteristic(
         session,
         current.machine.id,

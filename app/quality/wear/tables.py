@@ -11,7 +11,7 @@ from app.db.base import Base
 class Outlook(Base):
     """The limit that a characteristic comes to first, in how many parts, and whether its loop hunts.
 
-    It is a note, no state that readings are decided by: written without the machine's lock, and made anew at any time.
+    It is a note, no state that readings are decided by: written without the machine's lock, and made again at any time.
     """
 
     __tablename__ = "outlook"

@@ -136,7 +136,7 @@ def _same(r34: float, answer: Simulation | None) -> bool:
 def send_proposal(
     request: Request, session: SessionDep, caller: Operator, characteristic: str, form: FormDep
 ) -> Response:
-    """Propose what was replayed; the evidence is worked out anew from the same question."""
+    """Propose what was replayed; the evidence is worked out again from the same question."""
     current = characteristics.characteristic_named(session, characteristic)
     typed = form_reader.typed_from(form)
     try:

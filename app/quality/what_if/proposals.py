@@ -1,4 +1,4 @@
-"""Proposals of parameter changes as they stand. Never writes."""
+"""Proposals of parameter changes as they are. Never writes."""
 
 from typing import Any, NamedTuple
 
@@ -61,7 +61,7 @@ def proposals(
 ) -> list[ProposalRow]:
     """Newest first: of one characteristic, of one machine, of all; with one status or any.
 
-    holding: those in whose names, reason or author these words stand.
+    holding: those in whose names, reason or author these words are found.
     """
     names = (
         Characteristic.name,

@@ -93,7 +93,7 @@ class MapIn(SettingsIn):
 
 
 class ProposalIn(WhatIfIn):
-    """The settings to propose; the evidence is worked out anew."""
+    """The settings to propose; the evidence is worked out again."""
 
     reason: Reason
 

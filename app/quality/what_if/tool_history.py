@@ -138,10 +138,10 @@ class ToolHistory:
 
     @cached_property
     def steady(self) -> tuple[Flags, Flags]:
-        """Readings of the characteristic by which the effect of corrections can be told, and those of them that continue nothing.
+        """Readings of the characteristic by which the effect of corrections can be found, and those of them that continue nothing.
 
         Left out are readings from R37 on, and after a break, in which the machine cools down, the parts that had been cut
-        before it: the course begins anew behind them.
+        before it: the course begins again behind them.
         """
         history, count = self.history, len(self.history)
         own = np.cumsum(self.trace.marks & Mark.BEGIN > 0)[self.mine]

@@ -1,4 +1,4 @@
-"""Replays take turns: two at once, some wait, who comes after that is told to come again.
+"""Replays take turns: two at once, some wait, who comes after that is asked to come again.
 
 A replay keeps a core busy for up to some seconds. It lets the interpreter go meanwhile, so readings are taken as ever.
 """

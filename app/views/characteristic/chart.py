@@ -1,6 +1,6 @@
 """Everything that is read for the charts of one characteristic. Never writes.
 
-Beside the readings there are corrections and events. Of each no more are read than can be told apart on a chart, by an
+Beside the readings there are corrections and events. Of each no more are read than can be distinguished on a chart, by an
 index, however many there are.
 """
 

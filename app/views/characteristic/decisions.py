@@ -31,7 +31,7 @@ class Section(NamedTuple):
 
 @dataclass(frozen=True)
 class Decision:
-    """One reading with everything that hangs on it, as it stands now.
+    """One reading with everything that hangs on it, as it is now.
 
     reading: the answer that it was given (`app.loop.readings.answers`). touches: one list of repeats per point, mm.
     """

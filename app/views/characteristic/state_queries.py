@@ -1,4 +1,4 @@
-"""The plant as it stands, in a few statements however many characteristics there are. Never writes."""
+"""The plant as it is, in a few statements however many characteristics there are. Never writes."""
 
 from collections import defaultdict
 from dataclasses import dataclass

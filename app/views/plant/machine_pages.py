@@ -34,7 +34,7 @@ class Geometry(NamedTuple):
 def machines_page(
     request: Request, session: SessionDep, after: Annotated[int, Query(ge=0, le=1_000_000)] = 0, q: Sought = ""
 ) -> Response:
-    """Every machine with how it stands."""
+    """Every machine with its state."""
     groups = state_queries.plant(session, trends=False)
     groups = [group for group in groups if holds(q, group.machine.name, group.machine.key, group.machine.control)]
     part = slice_of(groups, ON_PAGE, after, partial(address, "/machines", q=q or None))

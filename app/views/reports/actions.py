@@ -93,7 +93,7 @@ def _keys(session: Session, bundle: Bundle) -> list[str]:
 
 
 def cancel(session: Session, number: int, caller: Caller) -> ReportJob:
-    """End it, whoever works on it. Raises `Conflict` when it is finished, `NotAllowed` for those of others."""
+    """End it, no matter who works on it. Raises `Conflict` when it is finished, `NotAllowed` for those of others."""
     job = queries.job(session, number)
     _must_own(job, caller)
     ended = session.execute(

@@ -65,7 +65,7 @@ def get_reports(session: SessionDep, number: Number) -> ReportsOut:
 
 @router.post("/reports/{number}/cancel", responses=problems(404, 409))
 def cancel_reports(session: SessionDep, caller: Viewer, number: Number) -> ReportsOut:
-    """End it. Whoever asked for it may, and every engineer. What is ready of it is thrown away."""
+    """End it. Anyone who asked for it may, and every engineer. What is ready of it is thrown away."""
     return ReportsOut.of(actions.cancel(session, number, caller))
 
 

@@ -97,7 +97,7 @@ class ReportsOut(Body):
 
     @classmethod
     def of(cls, job: ReportJob, troubles: list[tuple[str, str]] | None = None) -> "ReportsOut":
-        """As it stands."""
+        """As it is now."""
         return cls.model_validate(
             {
                 "id": job.id,

@@ -1,7 +1,7 @@
 """The thread that makes reports which were asked for many at once: one job at a time, one characteristic at a time.
 
-Whoever works on a job holds an advisory lock with its number, on a connection of its own: when the process ends, however it
-ends, the lock is free, and another process – or the same one, started anew – goes on behind the last characteristic that is ready.
+Anyone who works on a job holds an advisory lock with its number, on a connection of its own: when the process ends, however it
+ends, the lock is free, and another process – or the same one, restarted – goes on behind the last characteristic that is ready.
 After each characteristic the thread rests as long as it worked: readings come first. What a report shows is read from the
 standby, where one is named and has everything that was stored when the job was taken up.
 """

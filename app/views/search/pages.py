@@ -23,7 +23,7 @@ ON_PAGE = 100
 def search_page(
     request: Request, session: SessionDep, caller: Viewer, q: Annotated[str, Query(max_length=128)] = ""
 ) -> Response:
-    """Everything that bears the name, by kind: for browsers without scripts, and for whoever presses Enter."""
+    """Everything that bears the name, by kind: for browsers without scripts, and for those who press Enter."""
     clean = q.replace("\0", "")
     found = queries.hits(session, clean, caller)
     kinds = list(dict.fromkeys(hit.kind for hit in found))

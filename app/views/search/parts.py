@@ -27,7 +27,7 @@ Part = Annotated[str, StringConstraints(min_length=1, max_length=128), AfterVali
 
 
 def part_path(part: str) -> str:
-    """The page of a part. The name stands in the query, where `/` and `..` are letters like others."""
+    """The page of a part. The name is in the query, where `/` and `..` are letters like others."""
     return f"/parts?{urlencode({'part': part})}"
 
 

@@ -73,7 +73,7 @@ def _flat(values: dict[str, Any], prefix: str = "") -> dict[str, str]:
 
 
 def _said(value: Any) -> str:
-    """A value as people read it: what stands in a list is told, not written as JSON."""
+    """A value as people read it: what is in a list is reported, not written as JSON."""
     if isinstance(value, str):
         return value
     if isinstance(value, list):

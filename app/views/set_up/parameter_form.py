@@ -57,7 +57,7 @@ def _input(field: Field) -> Input:
 
 
 def factor_choices() -> list[tuple[str, str, str]]:
-    """The signs of domain §3, told by what is set up."""
+    """The signs of domain §3, found by what is set up."""
     return [
         ("-1", _("−1"), _("Lathe, offset kept in diameter, outside or inside. Length or face.")),
         ("-0.5", _("−1/2"), _("Lathe, offset kept as radius (L1). Milling radius, outside.")),
@@ -67,7 +67,7 @@ def factor_choices() -> list[tuple[str, str, str]]:
 
 
 ORDER = (
-    # inner, outer, the field where one is told
+    # inner, outer, the field where one is named
     ("R33", "R34", "averaging_limit"),
     ("R34", "R35/2", "averaging_limit"),
     ("R35/2", "R37", "wear_limit"),
@@ -166,7 +166,7 @@ def _text(value: Any) -> str:
 
 
 class Diagram(NamedTuple):
-    """The zone diagram's words as they stand, so that it is right before and without any script."""
+    """The zone diagram's words as they are, so that it is right before and without any script."""
 
     target: float | None
     width: float | None

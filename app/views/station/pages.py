@@ -66,7 +66,7 @@ def bind_page(request: Request, session: SessionDep, code: Annotated[str, Query(
 @router.post("", dependencies=[Depends(from_this_site)])
 @takes(FEW, by="anybody")
 def bind(request: Request, session: SessionDep, settings: SettingsDep, form: FormDep) -> Response:
-    """Bind this browser to the machine of the code. Whoever is signed in on it is signed out: it is everybody's from now on."""
+    """Bind this browser to the machine of the code. Anyone who is signed in on it is signed out: it is everybody's from now on."""
     try:
         device, token = devices.bind(session, form.get("code", ""))
     except Invalid as error:
@@ -110,7 +110,7 @@ def station_page(
     n: Number = None,
     note: Number = None,
 ) -> Response:
-    """The machine as it stands.
+    """The machine as it is.
 
     done, late: the alarm of the last action; tool: the tool that was changed; note: the one that was written. decided, too_late: the verb of what was done
     about correction ``n``, or had been decided before.
@@ -260,7 +260,7 @@ def _ask_correction(
 
 @router.post("/{machine}/corrections/{number}")
 def decide(request: Request, session: SessionDep, at: Station, machine: str, number: int, form: FormDep) -> Response:
-    """Approve, release or reject a correction. Somebody who comes too late sees how it stands."""
+    """Approve, release or reject a correction. Somebody who comes too late sees the state now."""
     on = OfCorrection(session, machine_named(session, machine), number, NOBODY)
     verb = named(verbs.CORRECTION, form.get("do", ""), on, _("Go back to the station of the machine."))
     try:

@@ -35,7 +35,7 @@ class Station(NamedTuple):
 
 
 def station(session: Session, machine: str) -> Station:
-    """The machine as it stands. Raises `NotFound`."""
+    """The machine as it is. Raises `NotFound`."""
     (group,) = state_queries.plant(session, machine=machine, trends=False)
     rows = sorted(group.rows, key=_place)
     first = rows[0] if rows else None

@@ -26,7 +26,7 @@ def to_do_page(
     late: Word = None,
     n: Number = None,
 ) -> Response:
-    """All that waits, with its next action; of one machine, or what the role of whoever asks may do.
+    """All that waits, with its next action; of one machine, or what the role of the one who asks may do.
 
     done, late: the verb of what was decided here about correction ``n`` at machine ``at``, or was decided before.
     """

@@ -33,7 +33,7 @@ MOST = 200  # of each kind, on one page
 
 
 class Task(NamedTuple):
-    """One thing that waits. state: for its badge; about: what it is about; role: whoever has it, or a higher one, may do it; number: of a correction."""
+    """One thing that waits. state: for its badge; about: what it is about; role: those who have it, or a higher one, may do it; number: of a correction."""
 
     kind: Kind
     state: str

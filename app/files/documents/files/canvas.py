@@ -26,7 +26,7 @@ def colour(text: str) -> Color:
 
 
 class Chart(Flowable):
-    """A drawing, as wide as it is told to be."""
+    """A drawing, as wide as it is ordered to be."""
 
     def __init__(self, drawing: Drawing, width: float) -> None:
         super().__init__()

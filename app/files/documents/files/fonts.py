@@ -1,6 +1,6 @@
 """Fonts of the PDF: FiraGO for Latin, Cyrillic, Greek, Hebrew, Arabic; the reader's own font for Chinese and Japanese.
 
-Letters that none of them has are shown as □: a report is never refused for a name. Right-to-left words stand in their
+Letters that none of them has are shown as □: a report is never refused for a name. Right-to-left words are in their
 order; Arabic letters are not joined.
 """
 

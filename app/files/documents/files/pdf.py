@@ -246,7 +246,7 @@ def _widths(report: Report, table: Table, width: float) -> list[float]:
 
 
 def _table(report: Report, table: Table, width: float) -> Flowable:
-    """Its heading stands on every page; a row is never parted."""
+    """Its heading is on every page; a row is never parted."""
     columns = [table.columns[at] for at in table.filled]
     widths = _widths(report, table, width)
     heading = [Paragraph(markup(column.name), HEAD_RIGHT if column.aligned == "right" else HEAD) for column in columns]

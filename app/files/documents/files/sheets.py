@@ -141,7 +141,7 @@ class _Writing:
             self.picture(picture, zone)
 
     def section(self, sheet: Worksheet, row: int, section: Section, zone: ZoneInfo, *, apart: bool) -> int:
-        """Title, sentences, facts, and the table if it stands below; the row after them."""
+        """Title, sentences, facts, and the table if it is below; the row after them."""
         sheet.write_string(row, 0, section.title, self.heading)
         row += 1
         for sentence in section.sentences:

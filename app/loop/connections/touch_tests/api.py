@@ -65,5 +65,5 @@ def stop_touch_test(session: SessionDep, caller: Operator, machine: MachineKey, 
 def report_touch_test(
     session: SessionDep, caller: AnyCaller, machine: MachineKey, number: Number, report: TouchTestReport
 ) -> TouchTestOut:
-    """The bridge says how far it has come; the answer is the test as it stands, with what people have answered meanwhile."""
+    """The bridge says how far it has come; the answer is the test as it is, with what people have answered meanwhile."""
     return TouchTestOut.of(actions.report(session, machine, number, report, caller))

@@ -20,7 +20,7 @@ from app.web.templates import page
 router = APIRouter(include_in_schema=False)
 TESTS = "/machines/{machine}/touch-tests"
 TOO_SOON: Final = 1.0
-"""s: nobody has looked at the control since the question stands there; a second click, or another browser, came in between."""
+"""s: nobody has looked at the control since the question is there; a second click, or another browser, came in between."""
 LATE: Final = 15.0
 """s within which a bridge writes or takes back."""
 

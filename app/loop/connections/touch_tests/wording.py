@@ -47,8 +47,7 @@ def awaited(row: TouchTestRow, late: float, *, silent: bool) -> bool:
 def how_to_allow(machine: str) -> str:
     """The setting that is missing where a bridge makes no touch tests by the page."""
     return _(
-        "Set touch_tests_by_page = true in [machine.{machine}] of the bridge's configuration and start it anew, or use the "
-        "command."
+        "Set touch_tests_by_page = true in [machine.{machine}] of the bridge's configuration and restart it, or use the command."
     ).format(machine=machine)
 
 

@@ -40,7 +40,7 @@ def add_hand_measurement(
     sequence: Sequence,
     given: HandMeasurementIn,
 ) -> HandMeasurementOut:
-    """Enter what a person measured on this part. It stands beside the machine's value; the decision stays as it was."""
+    """Enter what a person measured on this part. It is beside the machine's value; the decision stays as it was."""
     entry = _entry(session, caller, characteristic)
     good = None if given.verdict is None else given.verdict == "good"
     measurement = actions.measure(

@@ -57,7 +57,7 @@ class Item(NamedTuple):
 
 
 class Looked(NamedTuple):
-    """A file that was looked at: how it is read, and its first lines as they stand in it, by number."""
+    """A file that was looked at: how it is read, and its first lines as they are in it, by number."""
 
     layout: Layout
     first: list[tuple[int, list[str]]]
@@ -339,7 +339,7 @@ def objects(path: Path, kind: str) -> Iterator[tuple[int, Any]]:
 
 
 def _converted(values: dict[str, Any], layout: Layout, number: int) -> Iterator[Flaw]:
-    """Bring lengths to mm and times to their zone; what is of the wrong kind is told with the other fields."""
+    """Bring lengths to mm and times to their zone; what is of the wrong kind is reported with the other fields."""
     scale = LENGTHS[layout.unit]
     if scale != 1.0 and isinstance(values.get("measured"), int | float) and abs(values["measured"]) < 1e300:
         values["measured"] = round(values["measured"] * scale, 9)

@@ -276,7 +276,7 @@ def rows_of(path: Path, layout: Layout) -> Iterator[Row | Unusable]:
     last = layout.last_line or sys.maxsize
     every = delimited.rows(path, layout.encoding, layout.delimiter)
     rows = (row for row in every if layout.first_line <= row.line <= last)
-    if layout.kind == "sheet":  # what stands beside the table is no part of it
+    if layout.kind == "sheet":  # what is beside the table is no part of it
         return (_as_wide(row, width) for row in rows)
     complete = layout.last_line is not None or delimited.is_complete(path)
     return delimited.even(rows, width, layout.delimiter, complete=complete)
@@ -290,7 +290,7 @@ def _head(top: Sequence[Row], said: int | None, *, ragged: bool) -> tuple[int, t
     """The line of the header, and the names of the columns.
 
     A name that is missing in this line is taken from the lines above, as cells that are merged downwards have it. Where names
-    stand there twice, the group above them is said too, as cells that are merged across have it. ragged: rows may be shorter
+    are there twice, the group above them is said too, as cells that are merged across have it. ragged: rows may be shorter
     than the table is wide.
     """
     last = _last_head(top) if said is None else next((at for at, row in enumerate(top) if row.line == said), None)

@@ -16,7 +16,7 @@ CHECKED_LINES = 20_000
 
 
 class PreviewLine(NamedTuple):
-    """One line: its cells as they stand in the file, and what was made of them."""
+    """One line: its cells as they are in the file, and what was made of them."""
 
     number: int
     cells: list[str]
@@ -56,7 +56,7 @@ def preview(database: Database, characteristic: str, path: Path, looked: Looked)
 
 
 def first_lines(looked: Looked) -> list[PreviewLine]:
-    """The first lines as they stand in the file."""
+    """The first lines as they are in the file."""
     return [PreviewLine(number, cells, None, []) for number, cells in looked.first]
 
 

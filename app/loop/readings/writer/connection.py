@@ -1,4 +1,4 @@
-"""The connection of a writer: opened when it is needed, and how long the database has been away."""
+"""The connection of a writer: opened when it is needed, and how long the database has been unreachable."""
 
 import asyncio
 from contextlib import suppress
@@ -18,7 +18,7 @@ HELD = 0.7  # of the patience: as long do the readings of that machine wait for 
 STATEMENT = (
     0.8  # of the patience: no statement of single readings takes longer, so a wait has ended before nobody listens
 )
-LAST_ATTEMPT = 0.2  # of the patience, for the one attempt of whoever comes when it has run out
+LAST_ATTEMPT = 0.2  # of the patience, for the one attempt of the one who comes when it has run out
 
 # Every statement of the writer finds its rows by an index, however small the tables are when it is first planned; planned
 # each time, the planning would cost more than the work.
@@ -87,7 +87,7 @@ class WriterConnection:
                 await self.pipeline.connection.close()
 
     async def send(self, statement: str) -> None:
-        """Run one statement that nobody waits for; a database that is away has nobody to read it."""
+        """Run one statement that nobody waits for; a database that is unreachable has nobody to read it."""
         if self.pipeline is not None:
             self.answer_by(monotonic(), at_least=self.patience * LAST_ATTEMPT)
             with suppress(psycopg.Error):
@@ -112,7 +112,7 @@ class WriterConnection:
 
     @property
     def away_for(self) -> float:
-        """Seconds since the database began to be away; 0 while it is there."""
+        """Seconds since the database became unreachable; 0 while it is there."""
         return 0.0 if self._away_since is None else monotonic() - self._away_since
 
 

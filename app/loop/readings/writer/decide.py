@@ -38,7 +38,7 @@ from app.loop.readings.writer.snapshot import Part
 def decide_one_by_one(
     pending: PendingWrites, readings: Sequence[tuple[Entry, ReadingIn]], now: datetime
 ) -> list[Verdict | Stored | InbandError]:
-    """Decide readings in their order; a refusal stands in the place of its reading."""
+    """Decide readings in their order; a refusal is in the place of its reading."""
     outcomes: list[Verdict | Stored | InbandError] = []
     for entry, reading in readings:
         try:

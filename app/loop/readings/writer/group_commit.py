@@ -132,7 +132,7 @@ class Writer:
             batch, queue.waiting = queue.waiting[:MOST_AT_ONCE], queue.waiting[MOST_AT_ONCE:]
             outcomes = await _stored(store, batch)
             free = not any(isinstance(outcome, Busy) for outcome in outcomes)
-            if not free:  # whoever came behind them is not kept waiting once more
+            if not free:  # anyone who came behind them is not kept waiting once more
                 behind, queue.waiting = queue.waiting, []
                 batch, outcomes = batch + behind, [*outcomes, *(Busy(entry.machine) for entry, *_more in behind)]
             _answer(batch, outcomes)

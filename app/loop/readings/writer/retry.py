@@ -76,7 +76,7 @@ class ReadingStore:
         self, readings: Sequence[tuple[Entry, ReadingIn]], *, all_or_nothing: bool = False
     ) -> list[Outcome]:
         """Return the outcome of each reading, after the commit. Raises only when it is all or nothing, or `MachinesHeld`."""
-        # Whoever comes while the database has been away for long is not kept waiting once more.
+        # Anyone who comes while the database has been unreachable for long is not kept waiting once more.
         attempts = Attempts(self.connection, self.connection.deadline())
         optimistic = not self._pessimistic_for
         lock_wait: float | None = self.connection.lock_wait

@@ -158,7 +158,7 @@ WITH {_GUARD}, moved AS ({MOVE_STREAMS}), averaged AS ({MOVE_AVERAGES}),
 stored AS (INSERT INTO reading ({_COLUMNS}) SELECT {_COLUMNS} FROM json_to_recordset($4) AS r({_READING})),
 {PUBLISHED.format(changes="$5", after="FROM guard")} WHERE $6::bool
 """  # noqa: S608 - made of constants
-# For readings stored without a notification; whoever is woken reads on in the journal from where it was.
+# For readings stored without a notification; anyone who is woken reads on in the journal from where it was.
 NOTIFY = f"SELECT pg_notify({CHANNEL}, '')"
 COPY = f"COPY reading ({_COLUMNS}) FROM STDIN (FORMAT BINARY)"
 # The rarer rows, each statement sent only when there is something for it.

@@ -21,7 +21,7 @@ class Window:
     """A run of readings, first and last included; empty if last < first. `newest` is the stream's last sequence.
 
     period: of the run only those measured in it are meant. A reading that came late lies between others of another time; so
-    whoever counts, counts by it too.
+    anyone who counts, counts by it too.
     """
 
     first: int

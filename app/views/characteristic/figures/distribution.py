@@ -134,7 +134,7 @@ def histogram_figure(counts: Sequence[int], limits: HasLimits) -> Chart:
 def run_figure(points: Sequence[RunPoint], limits: HasLimits, *, sizes: SizeAxis) -> Chart:
     """Corrected sizes (mm) over time, with target and tolerance as the drawing has them.
 
-    What lies far outside the tolerance stands at the edge with its deviation: one probe fault would press all else into a line.
+    What lies far outside the tolerance is at the edge with its deviation: one probe fault would press all else into a line.
     """
     target, natural = sizes.target, natural_of(limits)
     judged = tolerance_about_target(half_of(limits), natural).judged

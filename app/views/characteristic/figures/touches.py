@@ -80,7 +80,7 @@ def _round(parameters: Parameters, points: Sequence[float]) -> list[str]:
 
 
 def _along(parameters: Parameters, points: Sequence[float]) -> list[str]:
-    """The profile: heights about the mean, with the fitted line where the taper is told."""
+    """The profile: heights about the mean, with the fitted line where the taper is known."""
     mean = sum(points) / len(points)
     heights = [point - mean for point in points]
     scale = 2.2 * _enlarged(heights)

@@ -73,7 +73,7 @@ def zone_chart(
 
     points: readings by ascending sequence. blocks: older ones, thinned; every block's extremes are drawn.
     steps: corrections by ascending sequence of the reading that caused them; total_before: their sum before the first (mm).
-    events: alarms, tool changes and others. hands: what was measured by hand. sizes: for the sizes at the left; without them deviations stand there.
+    events: alarms, tool changes and others. hands: what was measured by hand. sizes: for the sizes at the left; without them deviations are there.
     width: of the chart in pixels, about: decides which words have room.
     ringed: the number of the reading with a ring about it; `newest` is the last one.
     """
@@ -89,7 +89,7 @@ def zone_chart(
     first = min([block.first for block in blocks] + [point.sequence for point in points], default=1)
     last = max([block.last for block in blocks] + [point.sequence for point in points], default=first + 9)
     room = max((last - first) * 0.02, 0.6)
-    span = (first - room, last + max(room * 1.5, 1.2))  # what came after the last reading stands at the next number
+    span = (first - room, last + max(room * 1.5, 1.2))  # what came after the last reading is at the next number
     pixels = max(width - left - right, 200)
     readings: list[Drawn] = [
         *band_grounds(limits, ruler),
@@ -228,7 +228,7 @@ def _ring(points: Sequence[Point], ringed: int | Literal["newest"] | None, ruler
 
 
 def _average(blocks: Sequence[Block], points: Sequence[Point], ruler: Scale) -> list[Series]:
-    """M, as it stood after each reading; a gap where there was no memory."""
+    """M, as it was after each reading; a gap where there was no memory."""
     # Of very many readings M at the end of each block would be noise: the mean of the block says more.
     course = [(block.middle, block.average) for block in blocks if len(blocks) <= 150] + [
         (point.sequence, point.average) for point in points

@@ -13,7 +13,7 @@ from app.quality.capability.machine_queries import newest_run
 from app.quality.capability.queries import Study
 from app.views.reports.queries.frame import Frame
 
-FEW = 100  # of a million: more than these are told without decimals
+FEW = 100  # of a million: more than these are reported without decimals
 
 
 def capability(frame: Frame) -> Section:

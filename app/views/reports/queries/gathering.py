@@ -91,7 +91,7 @@ def _section(frame: Frame, name: SectionName) -> Section | None:
 
 
 def _period(frame: Frame) -> str:
-    """The period in words, as it stands on every page."""
+    """The period in words, as it is on every page."""
     request, ends, zone = frame.request, frame.ends, ZoneInfo(frame.request.zone)
     period = " – ".join(moment(at).words(zone) if at is not None else "…" for at in request.period)
     if ends is None:

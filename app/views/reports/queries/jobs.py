@@ -1,4 +1,4 @@
-"""Reports that were asked for many at once, as they stand."""
+"""Reports that were asked for many at once, as they are."""
 
 from collections.abc import Sequence
 
@@ -24,7 +24,7 @@ def job(session: Session, number: int) -> ReportJob:
 
 
 def may_end(job: ReportJob, caller: Caller) -> bool:
-    """Tell if the caller may cancel these reports and throw them away: whoever asked for them, and engineers."""
+    """Tell if the caller may cancel these reports and throw them away: anyone who asked for them, and engineers."""
     if job.person_id is None and job.key_id is None:  # asked for before the numbers were kept
         own = job.asked_by == caller.name
     else:

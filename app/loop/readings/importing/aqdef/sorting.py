@@ -92,7 +92,7 @@ def sort_out(
 ) -> Sorted:
     """Put the values of each characteristic, of the first `most` ones, into a file of the folder, as `Kept`.
 
-    spend: is told of bytes before they are written. Raises `Unusable`.
+    spend: is called with bytes before they are written. Raises `Unusable`.
     """
     sorter = _Sorter(aqdef.describe(source), wanted, wishes, folder, fingerprint(source.values or source.description))
     return sorter.run(source, most, spend, progress)
@@ -146,7 +146,7 @@ class _Sorter:
         return readings
 
     def _look_at_date(self, value: Value) -> None:
-        """Note a date of which nobody has said whether the day or the month comes first."""
+        """Note a date for which it is not known whether the day or the month comes first."""
         text = value.fields.get("K0004", "")
         match slashed(text):
             case Slashed.MONTH_FIRST:
