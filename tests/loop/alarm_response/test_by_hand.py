@@ -158,4 +158,4 @@ def test_no_words_are_put_into_anybodys_mouth(line: Shop, server: Server) -> Non
 def test_an_offset_that_nobody_has_said_is_called_assumed(line: Shop) -> None:
     worn = line.read(400.0)["alarms"][0]["id"]
     done = line.acknowledge(worn, "tool_replaced")
-    assert "Nobody has said with which offset: 0.0000\xa0mm is assumed." in [each["text"] for each in done["outcome"]]
+    assert "No offset was entered; 0.0000\xa0mm is assumed." in [each["text"] for each in done["outcome"]]

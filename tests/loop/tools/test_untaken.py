@@ -73,7 +73,7 @@ def test_corrections_in_a_row_raise_it_sooner(shop: Shop, runs: Runs) -> None:
     [alarm] = runs(3)
     assert "5 corrections of tool 3" in alarm["text"]
     shop.acknowledge(alarm["id"], "noted")
-    assert runs(3) == [], "it is not told again of the same ones"
+    assert runs(3) == [], "it is not reported again for the same ones"
 
 
 def test_what_the_bridge_holds_back_is_told_at_once_with_its_reason(shop: Shop, runs: Runs) -> None:
