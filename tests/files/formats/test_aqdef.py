@@ -134,7 +134,7 @@ def test_fields_above_the_first_and_below_the_last_values_are_refused(tmp_path: 
     rows = [f"K0014/{index} SN-1", *SETS[0][0], f"K0014/{index} SN-2", *SETS[1][0], f"K0014/{index} SN-3"]
     _description, found = parsed(tmp_path, HEAD + rows)
     [remark] = [str(each) for each in found if isinstance(each, Remark)]
-    assert remark.startswith(f"line 11, K0014/{index}: 'SN-3' stands above the first values and below the last ones")
+    assert remark.startswith(f"line 11, K0014/{index}: 'SN-3' is above the first values and below the last ones")
 
 
 def test_fields_above_a_line_that_holds_nothing_are_of_no_other(tmp_path: Path) -> None:
@@ -327,7 +327,7 @@ def test_letters_that_come_late_count_too(tmp_path: Path) -> None:
 
 
 def test_several_files_one_after_the_other_are_refused(tmp_path: Path) -> None:
-    with pytest.raises(Unusable, match="several files stand one after the other") as refusal:
+    with pytest.raises(Unusable, match="several files, one after the other") as refusal:
         parsed(tmp_path, [*HEAD, "K0001/1 1", "K0100 2", "K1001 08/15", "K2001/1 D35"])
     assert refusal.value.line == 10
 
