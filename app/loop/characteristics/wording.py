@@ -188,6 +188,13 @@ def sentence(problem: Problem) -> str:
         return order_sentence(data["inner"], data["outer"], millimetres(data["smaller"]), millimetres(data["larger"]))
     if problem.code in {"range", "source_range"}:
         return _range(problem, name)
+    known = _of_values(problem, name) | _of_points(problem, name) | _of_tools(problem)
+    return known.get(problem.code) or _natural(problem)
+
+
+def _of_values(problem: Problem, name: str) -> dict[str, str]:
+    """Sentences about a single value, or one that is missing, by the code of the problem."""
+    data = problem.data
     return {
         "required": _("{name} is missing; say it").format(name=name),
         "unknown": _("There is no parameter {name}; check the spelling or the R number").format(
@@ -217,6 +224,13 @@ def sentence(problem: Problem) -> str:
             "The bridge of this machine has no location for tool memory {value}: no correction of it reaches the control until "
             "[[machine.{machine}.location]] names it. The other tools go on"
         ).format(value=data.get("value"), machine=data.get("machine")),
+    }
+
+
+def _of_points(problem: Problem, name: str) -> dict[str, str]:
+    """Sentences about points, variants and sections, by the code of the problem."""
+    data = problem.data
+    return {
         "variant_axis": _("{name} is {axis}, but “{variant}” is measured in X only; check R25 and R30").format(
             name=name, axis=data.get("axis"), variant=choice("variant", data.get("variant", ""))
         ),
@@ -240,6 +254,17 @@ def sentence(problem: Problem) -> str:
             variant=choice("variant", data.get("variant", ""))
         ),
         "switch_loses": _("R24 = 0 asks for no two points, but the variant does; the variant counts"),
+        "sections": _(
+            "{name} {points} do not fit acceptance by {sections} sections; say {sections}, or leave it out"
+        ).format(name=name, points=data.get("points"), sections=data.get("sections")),
+        "accept": _('Acceptance must be {"n": n, "m": m} with whole numbers, 1 ≤ n ≤ m ≤ 100, for example 2 of 3'),
+    }
+
+
+def _of_tools(problem: Problem) -> dict[str, str]:
+    """Sentences about factor and tool, by the code of the problem."""
+    data = problem.data
+    return {
         "not_on_lathe": _(
             "Two-point measurement (R24) is not for lathes: the cycles know it on machining centres only"
         ),
@@ -264,11 +289,7 @@ def sentence(problem: Problem) -> str:
             "smaller. As a rule it is +1 for a length or a radius, +2 for a radius at an offset in diameter"
         ).format(value=f"{data.get('value', 0):+.10g}"),
         "factor_zero": _("The factor must not be 0: nothing would ever be corrected. To only measure, set R10 to 0"),
-        "sections": _(
-            "{name} {points} do not fit acceptance by {sections} sections; say {sections}, or leave it out"
-        ).format(name=name, points=data.get("points"), sections=data.get("sections")),
-        "accept": _('Acceptance must be {"n": n, "m": m} with whole numbers, 1 ≤ n ≤ m ≤ 100, for example 2 of 3'),
-    }.get(problem.code) or _natural(problem)
+    }
 
 
 def _natural(problem: Problem) -> str:

@@ -100,12 +100,7 @@ def decide_reading(pending: PendingWrites, entry: Entry, reading: ReadingIn, now
     alarms += [] if opposed is None else [opposed]
     correction = _issue(pending, stream, tool, sequence, decision) if tool and decision.amount is not None else None
 
-    stream.sequence = sequence
-    if average is not None and average.average != decision.average_after:
-        average.average = decision.average_after
-        average.changed = True
-    if decision.action is Action.STOP and stream.paused_by is None:
-        stream.paused_by = next(alarm for alarm in alarms if alarm.kind == ReadingAlarm.PROBE_FAULT.value)
+    _move_along(stream, sequence, decision, alarms)
     if not late:
         stream.last_measured_at = measured_at
         if not jump:
@@ -136,6 +131,17 @@ def decide_reading(pending: PendingWrites, entry: Entry, reading: ReadingIn, now
     if reading.key is not None:
         pending.by_key[entry.characteristic_id, reading.key] = verdict
     return verdict
+
+
+def _move_along(stream: PendingStream, sequence: int, decision: Decision, alarms: Sequence[PendingAlarm]) -> None:
+    """Count the reading, keep the running average, and pause after a probe fault."""
+    stream.sequence = sequence
+    average = stream.average
+    if average is not None and average.average != decision.average_after:
+        average.average = decision.average_after
+        average.changed = True
+    if decision.action is Action.STOP and stream.paused_by is None:
+        stream.paused_by = next(alarm for alarm in alarms if alarm.kind == ReadingAlarm.PROBE_FAULT.value)
 
 
 def _refuse_unissued(pending: PendingWrites, entry: Entry, in_effect: int | None) -> None:
