@@ -19,12 +19,13 @@ from app.loop.warnings.wording import sentence
 from app.quality.gauge_studies import actions, form_reader, labels, queries, wording
 from app.quality.gauge_studies.form_reader import Grid
 from app.quality.gauge_studies.queries import Advice, StudyRow
-from app.quality.gauge_studies.schemas import CorrectionIn, SettingsIn, StudyIn
+from app.quality.gauge_studies.schemas import CorrectionIn, StudyIn
 from app.quality.gauge_studies.tables import KINDS
 from app.quality.proof import queries as proof
 from app.quality.proof import wording as proof_wording
+from app.web import forms
 from app.web.deps import Before, FormDep, SessionDep, Sought
-from app.web.forms import by_field, parsed, read
+from app.web.forms import by_field
 from app.web.paging import address, part_of
 from app.web.templates import page
 
@@ -115,9 +116,8 @@ def send_new(request: Request, session: SessionDep, caller: Operator, form: Form
             filled = _filled(session, kind, typed)
             if filled is not None:
                 return _form(request, session, kind, *filled)
-            fields = {"kind": kind, "rows": form_reader.rows_of(kind, form_reader.stored_grid(kind, typed))}
-            named = {"machine": typed.get("machine"), "characteristic": typed.get("characteristic")}
-            study = parsed(StudyIn, read(SettingsIn, typed) | named | fields)
+            rows = form_reader.rows_of(kind, form_reader.stored_grid(kind, typed))
+            study = forms.typed(StudyIn, typed, kind=kind, rows=rows)
             machine = machines.machine_named(session, study.machine or "")
             source = _source(session, kind, typed, study)
             result = actions.add_study(session, machine, study, caller, source)
@@ -265,13 +265,8 @@ def send_correction(request: Request, session: SessionDep, caller: Engineer, num
             filled = _filled(session, kind, typed)
             if filled is not None:
                 return _form(request, session, kind, *filled, study=row)
-            seen = typed.get("seen_revision", "")
-            fields = {
-                "rows": form_reader.rows_of(kind, form_reader.stored_grid(kind, typed)),
-                "reason": typed.get("reason"),
-                "seen_revision": int(seen) if seen.isdecimal() and len(seen) < 10 else seen or None,
-            }
-            actions.correct_study(session, number, parsed(CorrectionIn, read(SettingsIn, typed) | fields), caller)
+            rows = form_reader.rows_of(kind, form_reader.stored_grid(kind, typed))
+            actions.correct_study(session, number, forms.typed(CorrectionIn, typed, rows=rows), caller)
     except InbandError as error:
         if not error.errors:
             raise
