@@ -25,15 +25,15 @@ from app.db.replica import Replica
 from app.geometry.alignment import api as alignments
 from app.geometry.alignment import pages as alignment_pages
 from app.geometry.alignment import pictures_api as alignment_pictures
-from app.geometry.geometric_form import api as forms
+from app.geometry.geometric_form import api as geometric_form
 from app.geometry.geometric_form import pages as form_pages
-from app.geometry.rotary_axes import api as kinematics
+from app.geometry.rotary_axes import api as rotary_axes
 from app.geometry.rotary_axes import new_pages as new_run_pages
-from app.geometry.rotary_axes import pages as kinematics_pages
+from app.geometry.rotary_axes import pages as rotary_axes_pages
 from app.geometry.rotary_axes import plan_api, plan_pages
-from app.geometry.rotary_axes import protocol_api as kinematics_protocol
-from app.geometry.work_zero import api as zeros
-from app.geometry.work_zero import pages as zero_pages
+from app.geometry.rotary_axes import protocol_api as rotary_axes_protocol
+from app.geometry.work_zero import api as work_zero
+from app.geometry.work_zero import pages as work_zero_pages
 from app.jobs.actions import PeriodicJob
 from app.jobs.runner import JobRunner
 from app.language.times import use_zone
@@ -63,10 +63,10 @@ from app.loop.readings.importing import pages as import_pages
 from app.loop.readings.writer.columnar import compile_now
 from app.loop.readings.writer.group_commit import Writer
 from app.loop.summaries import api as statistics
-from app.loop.tools import api as offsets
+from app.loop.tools import api as tools
 from app.loop.tools import edge_pages, edges_api, text_api, text_pages
-from app.loop.tools import jobs as offset_jobs
-from app.loop.tools import pages as offset_pages
+from app.loop.tools import jobs as tool_jobs
+from app.loop.tools import pages as tool_pages
 from app.loop.tools.untaken import Watch
 from app.memory import give_back_free_memory, keep_few_arenas
 from app.plants import pages as plants_pages
@@ -85,7 +85,7 @@ from app.quality.control_charts import (
     signals_pages,
 )
 from app.quality.control_charts import pages as control_pages
-from app.quality.gauge_studies import api as gauges
+from app.quality.gauge_studies import api as gauge_studies
 from app.quality.gauge_studies import pages as gauge_pages
 from app.quality.proof import api as proof
 from app.quality.proof import pages as proof_pages
@@ -143,7 +143,7 @@ ROUTERS: tuple[APIRouter, ...] = (
     search.router,
     proof.router,
     wear.router,
-    zeros.router,
+    work_zero.router,
     alignments.router,
     alignment_pictures.router,
     reports.router,
@@ -159,14 +159,14 @@ ROUTERS: tuple[APIRouter, ...] = (
     aqdef_api.router,
     readings.router,
     by_hand.router,
-    offsets.router,
+    tools.router,
     calibration.router,
-    gauges.router,
-    kinematics_protocol.router,
+    gauge_studies.router,
+    rotary_axes_protocol.router,
     plan_api.router,
-    kinematics.router,
+    rotary_axes.router,
     edges_api.router,
-    forms.router,
+    geometric_form.router,
     programs.router,
     text_api.router,
     alarms.router,
@@ -199,15 +199,15 @@ ROUTERS: tuple[APIRouter, ...] = (
     queue_pages.router,
     text_pages.router,
     edge_pages.router,
-    offset_pages.router,
+    tool_pages.router,
     calibration_pages.router,
     gauge_pages.router,
     form_pages.router,
     alignment_pages.router,
-    zero_pages.router,
+    work_zero_pages.router,
     new_run_pages.router,
     plan_pages.router,
-    kinematics_pages.router,
+    rotary_axes_pages.router,
     sign_in_pages.router,
     setup_pages.router,
     import_pages.router,
@@ -219,7 +219,7 @@ ROUTERS: tuple[APIRouter, ...] = (
 
 # What is done once a minute; see app.jobs.
 JOBS: tuple[PeriodicJob, ...] = (
-    *offset_jobs.JOBS,
+    *tool_jobs.JOBS,
     wear_actions.JOB,
     jobs.JOB,
     report_actions.JOB,
