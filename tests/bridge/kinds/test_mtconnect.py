@@ -160,7 +160,7 @@ def test_an_agent_started_anew_is_read_from_its_first_number() -> None:
             assert context.part_at(between) == "20"
             assert context.part_at(now()) == "21"
             assert context.gaps == 1
-            assert "started anew" in context.summary()
+            assert "restarted" in context.summary()
             assert "/SIM-0001/sample?from=1&count=1000" in simulator.asked
 
     run(work())
