@@ -7,6 +7,7 @@ keeps nothing waiting but itself: it is complete before a route begins, which ta
 import asyncio
 from collections.abc import Iterable
 from typing import NamedTuple
+from urllib.parse import unquote_plus
 
 from fastapi import FastAPI, Request
 from starlette.routing import BaseRoute, Route
@@ -14,7 +15,7 @@ from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from app.access.callers import Caller
 from app.access.recognition import caller_of, device_at
-from app.errors import InbandError, NotAllowed, NotSignedIn, TooLarge
+from app.errors import FieldError, InbandError, NotAllowed, NotSignedIn, TooLarge
 from app.language.i18n import _
 from app.web.deps import SAFE_METHODS
 from app.web.limits import DEFAULT, FORM, Takes, taken_by, too_large
@@ -28,7 +29,8 @@ def read_after_recognition(app: FastAPI) -> None:
 PIECE = 8000
 """Bytes of a form that are taken apart in one turn of the event loop: some milliseconds."""
 MOST_ESCAPED = 50_000
-"""Bytes of one field of a form that do not stand for themselves: all of it is made a text in one turn, some 15 ms."""
+"""Bytes of one field of a form that do not stand for themselves: all of it is made a text in one turn, some 15 ms. Pages whose
+fields take longer texts send their form as multipart, in which everything stands for itself."""
 _PLAIN = bytes(set(range(128)) - {ord("%")})
 
 
@@ -149,21 +151,33 @@ async def _read(receive: Receive, allowance: Allowance, form: bool) -> Receive:
     if more:
         return _replayed(receive, [message])
     body = b"".join(parts)
-    if form and _escaped(body) > MOST_ESCAPED and any(_escaped(field) > MOST_ESCAPED for field in body.split(b"&")):
-        return _refusing(
-            TooLarge(
-                _("A field of the form holds more than {most} characters that are no plain letters.").format(
-                    most=MOST_ESCAPED
-                ),
-                _("Send it in several smaller requests."),
-            )
-        )
+    if form and (field := _too_escaped(body)) is not None:
+        return _refusing(_too_many_signs(field))
     size = PIECE if form else max(total, 1)
     pieces = [body[at : at + size] for at in range(0, total, size)] or [b""]
     last = len(pieces) - 1
     return _replayed(
         receive,
         [{"type": "http.request", "body": piece, "more_body": at < last} for at, piece in enumerate(pieces)],
+    )
+
+
+def _too_escaped(body: bytes) -> str | None:
+    """The name of the field that holds more than `MOST_ESCAPED`, if one does."""
+    if _escaped(body) <= MOST_ESCAPED:
+        return None
+    names = (field.partition(b"=")[0] for field in body.split(b"&") if _escaped(field) > MOST_ESCAPED)
+    return next((unquote_plus(name[:60].decode("latin-1")) for name in names), None)
+
+
+def _too_many_signs(field: str) -> TooLarge:
+    wrong = _("holds more than {most} characters that are no plain letters or digits").format(most=MOST_ESCAPED)
+    return TooLarge(
+        f"{field}: {wrong}.",
+        _(
+            "Paste less at once. A program sends long texts as multipart/form-data, which has no such limit, or as JSON."
+        ),
+        errors=[FieldError(field, wrong)],
     )
 
 

@@ -47,7 +47,7 @@ def lines_of(text: str) -> list[tuple[str, bool]]:
     [('R35/2  +8.0 <', True), ('tolerance', False)]
     """
     parts = re.split(r"<br\s*/?>", text)
-    return [(unescape(re.sub(r"<[^>]*>", "", part)).replace("\n", " "), "<b>" in part) for part in parts]
+    return [(unescape(re.sub(r"<[^<>]*>", "", part)).replace("\n", " "), "<b>" in part) for part in parts]
 
 
 class _Laid(NamedTuple):

@@ -94,7 +94,7 @@ HOLE_J: dict[int, tuple[int, ...]] = {
     7: (4, 6, 8, 10, 12, 14, 18, 22, 26, 30, 36, 39, 43),
     8: (6, 10, 12, 15, 20, 24, 28, 34, 41, 47, 55, 60, 66),
 }
-_TEXT = re.compile(r"\s*[ØøΦφ⌀]?\s*([0-9.,]{1,20})\s*([A-Za-z]{1,2})\s*([1-9][0-9]?)\s*")
+_TEXT = re.compile(r"\s*+[ØøΦφ⌀]?\s*+([0-9.,]{1,20})\s*+([A-Za-z]{1,2})\s*+([1-9][0-9]?)\s*+")
 """IT0 and IT01 are grades of their own, so a leading zero is refused. Texts copied from documents have blanks of several kinds."""
 
 

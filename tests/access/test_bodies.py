@@ -1,6 +1,7 @@
 """Bodies of requests: nothing is read before it is known from the head who sends them, and no further than that caller may send."""
 
 import json
+import re
 import threading
 from collections.abc import Iterator
 from typing import Any, NamedTuple
@@ -8,7 +9,8 @@ from typing import Any, NamedTuple
 import pytest
 from fastapi.routing import APIRoute
 
-from app.access import devices
+from app import HOUSE
+from app.access import bodies, devices
 from app.main import ROUTERS
 from app.web import json_bodies
 from app.web.deps import SAFE_METHODS
@@ -174,10 +176,24 @@ def test_a_field_of_a_form_that_would_take_the_event_loop_is_refused(server: InP
     large = f"csrf=none&note={field * 60_000}".encode("latin-1")
     answer = browser.post("/setup/machines/new", content=large, headers=head)
     assert answer.status_code == 413, answer.text[:500]
-    assert "more than 50000 characters that are no plain letters" in answer.text
+    assert "note: holds more than 50000 characters that are no plain letters or digits." in answer.text
+    assert "multipart/form-data" in answer.text  # which takes it
+    files = {"csrf": (None, "none"), "note": (None, "%" * 60_000)}
+    assert browser.post("/setup/machines/new", files=files).status_code == 403  # no token
     many = "&".join(["csrf=none", *(f"note{at}={field * 1000}" for at in range(60))]).encode("latin-1")
     for allowed in (many, b"csrf=none&note=" + b"a" * 900_000):
         assert browser.post("/setup/machines/new", content=allowed, headers=head).status_code == 403  # no token
+
+
+def test_no_page_takes_a_longer_text_than_its_form_can_send() -> None:
+    """A blank line, a tab, a sign of a number: each is escaped in an ordinary form, and some in two or more bytes."""
+    for path in (HOUSE / "frontend/templates").rglob("*.html"):
+        for form in path.read_text().split("<form")[1:]:
+            head, _end, rest = form.partition(">")
+            longest = max(
+                map(int, re.findall(r"textarea\(.*?maxlength=(\d+)", rest.partition("</form>")[0])), default=0
+            )
+            assert longest <= bodies.MOST_ESCAPED or "multipart" in head, (path.name, longest)
 
 
 @pytest.mark.parametrize("size", [100, 2 * json_bodies.ON_THE_LOOP])

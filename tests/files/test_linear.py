@@ -1,11 +1,8 @@
-"""Expressions and loops over text of others take ten times as long for ten times the text, not a hundred times.
+"""Loops over text of others take ten times as long for ten times the text, not a hundred times (expressions: tests/test_expressions.py).
 
 The limits are seconds of a processor, a hundred times what is needed; what grows with the square of its input needs minutes.
 """
 
-import importlib
-import pkgutil
-import re
 import time
 from collections.abc import Callable
 from contextlib import suppress
@@ -16,7 +13,6 @@ import pytest
 
 from app.core import number_text
 from app.errors import Invalid
-from app.files import formats
 from app.files.formats import aqdef, aqdef_times, aqdef_values, cell_values, delimited, markup, units
 from app.files.formats.aqdef import Source
 from app.files.formats.rotary_protocol import read_protocol
@@ -24,20 +20,11 @@ from app.loop.readings.importing.layout import Wishes, look
 
 MOST = 3.0  # s of a processor
 LONG = 100_000  # characters: a cell of CSV may have 131,072
-CELL = markup.LONGEST  # of a protocol, whatever is longer is cut
-OF_CELLS = {"rotary_protocol", "rotary_words", "rotary_stems"}
 TEXTS = (
     "1", "1 ", "1.", "1,", "1/2,", "-1", "+", " ", "\t", "(", "[(<", "( ", "a", "a ", "a.", "Ä", "_m", "=", ";+", ";+1", "K1001 ",
     "K0001/1/", "¤", "\x0f", "\x14", "\n", '"', "e", "1e", ":", "1:1", "x=1 ", "ex0c ", "achse ", "\u0316\u0301", "<a ", "mm ",
 )  # fmt: skip
 """Repeated, and with a sign behind them that fits nowhere."""
-MODULES = [importlib.import_module(f"app.files.formats.{each.name}") for each in pkgutil.iter_modules(formats.__path__)]
-EXPRESSIONS = {
-    f"{module.__name__.rpartition('.')[2]}.{name}": value
-    for module in [*MODULES, number_text]
-    for name, value in vars(module).items()
-    if isinstance(value, re.Pattern)
-}
 
 
 def seconds(call: Callable[..., Any], *given: Any) -> float:
@@ -45,16 +32,6 @@ def seconds(call: Callable[..., Any], *given: Any) -> float:
     with suppress(ValueError, Invalid):
         call(*given)
     return time.thread_time() - begun
-
-
-@pytest.mark.parametrize("name", EXPRESSIONS)
-def test_every_expression(name: str) -> None:
-    expression = EXPRESSIONS[name]
-    most = CELL if name.partition(".")[0] in OF_CELLS else LONG // 5
-    for text in TEXTS:
-        long = text * (most // len(text)) + "\x00"
-        for way in (expression.search, expression.fullmatch, expression.match):
-            assert seconds(way, long) < MOST / 6, (name, way.__name__, text)
 
 
 @pytest.mark.parametrize(

@@ -14,7 +14,7 @@ from collections.abc import Iterator, Mapping
 from typing import Any
 
 from app.core.natural import assumed, half_width
-from app.core.number_text import has_printed_minus, plain
+from app.core.number_text import has_printed_minus
 from app.core.parameters import BY_NAME, FieldKind, Parameters, mean_nominal
 from app.core.programs import printed_macros, unit_check
 from app.core.programs.lines import (
@@ -37,6 +37,7 @@ from app.core.programs.lines import (
     says_inch,
     setting_in,
     settings,
+    single_blanks,
     split,
     unit_note,
     written,
@@ -126,7 +127,7 @@ class _Reader:
         body = _COMMENT.sub(" ", text)
         if has_printed_minus(body):
             notes.append(Note("printed_minus", {}))
-        numbered = plain(body)
+        numbered = single_blanks(body)
         body = re.sub(r"^/?\s*(?:[NO]\s*\d+)?\s*", "", numbered, flags=re.IGNORECASE)
         self._words(number, self._steps(body, notes), notes)
         if not notes:

@@ -70,12 +70,14 @@ WIDTH = 10  # characters of a number in QS144 to QS146, which one blank parts
 
 _BLOCK = re.compile(r"\s*/?\s*(?:N\s*)?\d*\s+(?=\D)|\s*/?\s*N\s*\d+\s*", re.ASCII | re.IGNORECASE)
 _CALL = re.compile(
-    r"(?:TCH\s+PROBE\s+|G)(45[012])(?:\.0)?(?![\d.])\s*([^=~;]*?)(?=\s*(?:Q[SLR]?\d+\s*=|~|\*?$))", re.IGNORECASE
+    r"(?:TCH\s+PROBE\s+|G)(45[012])(?:\.0)?(?![\d.])\s*([^=~;]*?)(?<!\s)(?=\s*(?:Q[SLR]?\d+\s*=|~|\*?$))", re.IGNORECASE
 )
 _NUMBER = re.compile(rf"(Q\d{{1,4}})\s*=\s*({NUMBER})(?=\s*(?:$|[~;*]|Q))", re.ASCII | re.IGNORECASE)
 _STRING = re.compile(r"(QS\d{1,4})\s*=\s*[\"“”]([^\"“”]*)[\"“”]", re.ASCII | re.IGNORECASE)
-_WORD = re.compile(r"(Q\d{1,4})\s*=?\s*(FMAX|FAUTO|PREDEF)\b", re.ASCII | re.IGNORECASE)
-_BROKEN = re.compile(r"(Q[SLR]?\d{1,4})\s*=\s*([^~;]*?)(?=\s*(?:$|[~;]|\*$|Q[SLR]?\d+\s*=))", re.ASCII | re.IGNORECASE)
+_WORD = re.compile(r"(Q\d{1,4})\s*+=?\s*(FMAX|FAUTO|PREDEF)\b", re.ASCII | re.IGNORECASE)
+_BROKEN = re.compile(
+    r"(Q[SLR]?\d{1,4})\s*=\s*([^~;]*?)(?<!\s)(?=\s*(?:$|[~;]|\*$|Q[SLR]?\d+\s*=))", re.ASCII | re.IGNORECASE
+)
 _OF_CALL = re.compile(r"\s*(?:\d+\s+)?Q(?:S409|(?!14\d\b)\d{3})\b", re.ASCII | re.IGNORECASE)  # a line without its ~
 _SUBSTR = re.compile(
     r"(QS\d{1,4})\s*=\s*SUBSTR\s*\(\s*SRC_(QS14[456])\s+BEG(\d{1,3})\s+LEN(\d{1,3})\s*\)", re.ASCII | re.IGNORECASE

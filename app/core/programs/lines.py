@@ -162,6 +162,15 @@ def split(text: str) -> list[str]:
     return lines
 
 
+def single_blanks(block: str) -> str:
+    """A block with ordinary signs and single blanks: expressions that take blanks anywhere try every way to share a row of them.
+
+    >>> single_blanks(" R32\\t =  \N{MINUS SIGN}0.016 ")
+    'R32 = -0.016'
+    """
+    return " ".join(plain(block).split())
+
+
 def line_of(number: int, text: str, notes: Iterable[Note]) -> Line:
     """The line with the verdict that its notes come to: one word not understood is enough."""
     line_notes = tuple(notes)

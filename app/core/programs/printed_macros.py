@@ -99,7 +99,9 @@ def steps(body: str, patterns: Iterable[_Step]) -> tuple[list[Note], str]:
             notes.append(Note("step", {"step": step} | _named(dict(zip(names, match.groups(), strict=False)))))
             return " "
 
-        body = pattern.sub(said, body)
+        body, found = pattern.subn(said, body)
+        if found:
+            body = " ".join(body.split())
     return notes, body.strip() if notes else body
 
 

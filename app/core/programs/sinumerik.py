@@ -12,7 +12,7 @@ here; where the unit changes between an assignment and the call, nobody can tell
 import re
 from typing import Any
 
-from app.core.number_text import has_printed_minus, plain
+from app.core.number_text import has_printed_minus
 from app.core.parameters import BY_NAME, BY_R, TWO_POINT_SWITCH, FieldKind
 from app.core.programs import printed_macros
 from app.core.programs.lines import (
@@ -31,6 +31,7 @@ from app.core.programs.lines import (
     number_in,
     says_inch,
     setting_in,
+    single_blanks,
     split,
     unit_note,
 )
@@ -122,7 +123,7 @@ class _Reader:
         comments: list[str] = []
         if "INBAND" not in text.upper():  # a step's brackets are no comments
             statement, semicolon, comment = text.partition(";")
-            steps, rest = printed_macros.steps(plain(statement), printed_macros.SINUMERIK)
+            steps, rest = printed_macros.steps(single_blanks(statement), printed_macros.SINUMERIK)
             notes += steps
             text = rest + semicolon + comment if steps else text
 
@@ -135,7 +136,7 @@ class _Reader:
         body = _COMMENT.sub(without, text)
         if has_printed_minus(body):
             notes.append(Note("printed_minus", {}))
-        body = plain(body)
+        body = single_blanks(body)
         for comment in comments:
             self._comment(number, comment, notes)
         if _HEADING.fullmatch(body):

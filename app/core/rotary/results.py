@@ -22,10 +22,11 @@ OPTIMISED: dict[str, AxisName] = {"Q144": "A", "Q145": "B", "Q146": "C"}
 OFFSETS = {"Q147": "X", "Q148": "Y", "Q149": "Z"}
 SCALARS = (*MEASURED, *OPTIMISED, *OFFSETS)
 LARGEST = 1e5  # mm or degrees; nothing on a machine is further off
-_NUMBER = re.compile(r"[+-]?(\d+[.,]?\d*|[.,]\d+)")
+_NUMBER = re.compile(r"[+-]?(\d++(?:[.,]\d*)?|[.,]\d+)")
 _APART = re.compile(r"(?<=\d)(?=[+\N{MINUS SIGN}-]\d)")
 _BEGIN = re.compile(r"(?:(?<![\w.,=:])(?<![=:] )N?\d+\s+)?(?<!\w)QS?1[0-9]{2}\s*[=:]", re.IGNORECASE)
-_LINE = re.compile(r"""^\s*(?:N?\d+\s+)?(QS?1[0-9]{2})\s*[=:;\t ]\s*["'“”„«]?(.*?)["'“”»]?\s*;?\s*$""", re.IGNORECASE)
+_LINE = re.compile(r"""\s*+(?:N?\d+\s+)?(QS?1[0-9]{2})(?:\s*+[=:;]\s*+|\s++)["'“”„«]?(.*)""", re.IGNORECASE)
+_CLOSING = "\"'“”»"
 
 
 class Damage(StrEnum):
@@ -153,18 +154,18 @@ def read_results(text: str) -> Results:
     flaws: list[Flaw] = []
     seen: set[str] = set()
     for line in _lines(text):
-        match = _LINE.match(line)
-        name = match[1].upper() if match else ""
+        match = _LINE.fullmatch(line)
+        name, value_text = (match[1].upper(), _unquoted(match[2])) if match else ("", "")
         if match is None or name not in {*SCALARS, *STRINGS}:
             flaws.append(Flaw("", 0, Damage.UNKNOWN, line.strip()))
         elif name in seen:
-            flaws.append(Flaw(name, 0, Damage.TWICE, match[2]))
+            flaws.append(Flaw(name, 0, Damage.TWICE, value_text))
         elif name in STRINGS:
-            read = read_string(name, match[2])
+            read = read_string(name, value_text)
             flaws += read.flaws
             errors[STRINGS[name]] = read.values
         else:
-            value, damage = read_number(match[2].removesuffix("mm").removesuffix("мм"))
+            value, damage = read_number(value_text.removesuffix("mm").removesuffix("мм"))
             if value == NOT_MEASURED and name not in OFFSETS:
                 value, damage = None, None
             elif value is not None and value < 0 and name not in OFFSETS:
@@ -172,9 +173,15 @@ def read_results(text: str) -> Results:
             if value is not None:
                 scalars[name] = value
             if damage is not None and damage is not Damage.COMMA:
-                flaws.append(Flaw(name, 0, damage, match[2]))
+                flaws.append(Flaw(name, 0, damage, value_text))
         seen.add(name)
     return Results(scalars, errors, tuple(flaws))
+
+
+def _unquoted(text: str) -> str:
+    """The value without the semicolon and the quotation mark behind it."""
+    text = text.rstrip().removesuffix(";").rstrip()
+    return text[:-1] if text.endswith(tuple(_CLOSING)) else text
 
 
 def _lines(text: str) -> list[str]:

@@ -28,7 +28,7 @@ _AXIS = re.compile(
 _NUMBER = re.compile(
     r"(?:(?<![\w.,+-])|(?<=,)(?=[+-]))([+-]?\d{1,12}(?:[.,]\d{1,12})?)(?![.,]?\d)\s*(mm|um|µm|μm|°|deg|grad|inch|in|\")?(?![\w])"
 )
-_COORDINATE = re.compile(r"\b([xyz])\s*[=:]?\s*([+-]?[\d.,]{1,26}(?<![.,]))\s*(mm|um|µm|μm)?", re.IGNORECASE)
+_COORDINATE = re.compile(r"\b([xyz])\s*+[=:]?\s*+([+-]?[\d.,]{1,26}(?<![.,]))\s*(mm|um|µm|μm)?", re.IGNORECASE)
 _DEVIATION = re.compile(r"\be([xyz])([abc])\b")
 _WORDS = re.compile(r"[^\d+\N{MINUS SIGN}]*")
 _LAST_WORD = re.compile(r"[^\W\d]\)?\Z")
@@ -38,7 +38,7 @@ _CLOCK = re.compile(r"\d{1,2}:\d{2}")
 _ALONE = re.compile(r"(?:[a-z]{1,20} ){0,2}(?:[a-z]{0,20}achse|axis|os)(?: of rotation)?")  # Vermessene Rotationsachse
 _LETTER = re.compile(r"\s*([abc])(?:[\s-]*(?:achse|axis|os))?\s*", re.IGNORECASE)
 _ERROR = re.compile(
-    r"\b(E[XYZABC]0[ABC])\b\s*[=:]?\s*([+-]?\d{1,6}(?:[.,]\d{1,12})?)\s*(mm|um|µm|μm|°|deg|grad)?(?![\w.,]*\w)",
+    r"\b(E[XYZABC]0[ABC])\b\s*+[=:]?\s*+([+-]?\d{1,6}(?:[.,]\d{1,12})?)\s*(mm|um|µm|μm|°|deg|grad)?(?![\w.,]*\w)",
     re.IGNORECASE,
 )
 _CYCLE = re.compile(r"\b45[0-3]\b")

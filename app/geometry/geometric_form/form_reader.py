@@ -12,7 +12,8 @@ from app.language.i18n import _
 from app.web.forms import length, read
 
 HEAD = re.compile(
-    r"^\s*(?:section\s*\d*)?\s*[,:;]?\s*(?:[Zz]\s*[=:]?\s*(?P<height>[-+−]?[\d.,]+)\s*)?(?:mm)?\s*:?\s*$", re.IGNORECASE
+    r"\s*+(?:section\s*+\d*+)?\s*+[,:;]?\s*+(?:[Zz]\s*+[=:]?\s*+(?P<height>[-+−]?[\d.,]++)\s*+)?(?:mm)?\s*+:?\s*+",
+    re.IGNORECASE,
 )
 NUMBER = re.compile(r"^[-+]?(?:\d+(?:\.\d*)?|\.\d+)(?:[eE][-+]?\d{1,2})?$")
 MOST_LETTERS = 200_000
@@ -27,7 +28,7 @@ def sections(text: str, field: str) -> list[dict[str, Any]]:
     found: list[dict[str, Any]] = []
     fresh = True
     for number, row in enumerate(text.splitlines(), start=1):
-        if (head := HEAD.match(row)) is not None:
+        if (head := HEAD.fullmatch(row)) is not None:
             fresh = True
             if head["height"]:
                 found.append({"touches": [], "height": length(head["height"])})

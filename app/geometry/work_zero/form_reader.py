@@ -29,9 +29,9 @@ APPROACHES: dict[str, tuple[str, ...]] = {
     "corner": ("+X", "+Y", "", "", "", ""),
 }
 _NUMBER = r"[-+]?(?:\d+(?:\.\d*)?|\.\d+)"
-_RECORD = re.compile(rf"(?<![\w.#])(R[1-4]|#50[1245]|#508|#2)\s*[=:\s]\s*({_NUMBER})(?![\w.])", re.IGNORECASE)
+_RECORD = re.compile(rf"(?<![\w.#])(R[1-4]|#50[1245]|#508|#2)(?:\s*+[=:]\s*+|\s++)({_NUMBER})(?![\w.])", re.IGNORECASE)
 _APPROACH = re.compile(r"(?<!\S)([+-])\s?([XY])(?![\w.])", re.IGNORECASE)
-_WORD = re.compile(rf"(?<![\w.])([XY])\s*[=:]?\s*({_NUMBER})(?![\w.])", re.IGNORECASE)
+_WORD = re.compile(rf"(?<![\w.])([XY])\s*+[=:]?\s*+({_NUMBER})(?![\w.])", re.IGNORECASE)
 _BARE = re.compile(rf"(?<![\w.])({_NUMBER})(?![\w.])")
 
 
@@ -68,6 +68,8 @@ def fields(form: Mapping[str, str]) -> tuple[dict[str, Any], list[str]]:
         touches.append(_touch(x, y, form.get(f"approach{at}", "").strip()))
         typed_in.append(f"touch{at}")
     text = form.get("lines", "")
+    if len(text) > MOST_LETTERS:
+        raise Invalid.at("lines", _("the text is too long for {most} points").format(most=MOST_TOUCHES))
     records = _records(text)
     if records and not touches:
         return values | records, ["lines"] * 4
@@ -103,8 +105,6 @@ def _records(text: str) -> dict[str, Any]:
 
 
 def _lines(text: str) -> list[dict[str, Any]]:
-    if len(text) > MOST_LETTERS:
-        raise Invalid.at("lines", _("the text is too long for {most} points").format(most=MOST_TOUCHES))
     return [_line(row, number) for number, row in enumerate(_plain(text).splitlines(), 1) if row.strip()]
 
 

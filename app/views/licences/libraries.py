@@ -77,7 +77,7 @@ def requirements(lines: Iterable[str], extras: frozenset[str]) -> Iterator[tuple
         only_for = set(_EXTRA.findall(condition))
         name = re.match(r"[A-Za-z0-9._-]+", needed.strip())
         if name is not None and (not only_for or only_for & extras):
-            asked = re.search(r"\[([^]]*)\]", needed)
+            asked = re.search(r"\[([^][]*)\]", needed)
             yield plain(name[0]), frozenset(each.strip() for each in asked[1].split(",")) if asked else frozenset()
 
 

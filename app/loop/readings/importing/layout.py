@@ -2,7 +2,7 @@
 
 import json
 import sys
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import accumulate, chain, islice
 from pathlib import Path
@@ -20,6 +20,8 @@ from app.language.i18n import _
 from app.loop.readings.origin import COLUMNS
 
 MOST_COLUMNS = 500
+LONGEST_NAME = 1_000
+"""Characters of a column's name, or a characteristic's: the page shows each a dozen times, and a cell may have 131,072."""
 TOP = 50  # rows in which the header is looked for
 ORIGIN = COLUMNS[:2]
 """Fields that are no choice of a person: they are there in what Inband wrote."""
@@ -185,15 +187,23 @@ def unit_of(column: str, said: str | None) -> str:
         ) from None
 
 
-def _refuse_wide(columns: int) -> None:
+def _refuse_wide(header: Collection[str]) -> None:
     """Refuse what is no table of readings, before each column is looked at and offered for choice."""
-    if columns > MOST_COLUMNS:
+    if len(header) > MOST_COLUMNS:
         raise wrong(
             "file",
             _("The file has {columns} columns; at most {most} are taken. Is its first line the header?").format(
-                columns=columns, most=MOST_COLUMNS
+                columns=len(header), most=MOST_COLUMNS
             ),
         )
+    for number, name in enumerate(header, 1):
+        if len(name) > LONGEST_NAME:
+            raise wrong("file", f"{_('column {n}').format(n=number)} {_long_name(name)}")
+
+
+def _long_name(name: str) -> str:
+    words = _("has a name of {n} characters; at most {most} are taken. It begins: {name}")
+    return words.format(n=len(name), most=LONGEST_NAME, name=name[:40])
 
 
 def _csv_layout(path: Path, wishes: Wishes, zone: ZoneInfo | None, kind: str = "csv") -> Layout:
@@ -204,7 +214,7 @@ def _csv_layout(path: Path, wishes: Wishes, zone: ZoneInfo | None, kind: str = "
     if not top:
         raise wrong("file", _("The file is empty."))
     head, header = _head(top, wishes.header_line, ragged=kind == "sheet")
-    _refuse_wide(len(header))
+    _refuse_wide(header)
     first_line = max(head + 1, wishes.first_line or 0)
     columns = _columns(header, wishes.mapping)
     place = columns.get("measured", (0,))[0]
@@ -257,6 +267,10 @@ def _names_in(path: Path, layout: Layout) -> tuple[str, ...]:
     names: dict[str, None] = {}
     for row in rows_of(path, layout):
         if isinstance(row, Row) and (name := named_in(row, layout)) and tuple(row.cells) != layout.header:
+            if len(name) > LONGEST_NAME:
+                raise wrong(
+                    f"{layout.named('characteristic')}, {_('line {line}').format(line=row.line)}", _long_name(name)
+                )
             names[name] = None
             if len(names) > MOST_NAMES:
                 column = layout.named("characteristic")
@@ -338,7 +352,7 @@ def _json_layout(path: Path, wishes: Wishes, zone: ZoneInfo | None, *, is_list: 
     for value in values:
         if isinstance(value, dict):
             names.update(dict.fromkeys(map(str, value)))
-            _refuse_wide(len(names))
+            _refuse_wide(names)
     header = tuple(names)
     if not header:
         raise wrong("file", _("The file holds no JSON objects."))

@@ -237,6 +237,23 @@ def test_a_file_of_very_many_columns_is_refused_before_each_is_looked_at(tmp_pat
             look(file(columns), Wishes())
 
 
+@pytest.mark.parametrize(
+    ("name", "text"),
+    [
+        ("a.csv", f"measured;{'n' * 1_001}\n40,1;2\n"),
+        ("a.ndjson", json.dumps({"measured": 40.1, "n" * 1_001: 2}) + "\n"),
+        ("a.csv", f"characteristic;measured\n{'n' * 1_001};40,1\n"),
+    ],
+    ids=["column", "name of JSON", "characteristic"],
+)
+def test_a_name_of_a_hundred_thousand_letters_is_no_name(tmp_path: Path, name: str, text: str) -> None:
+    """Each stands a dozen times on the page: 500 of them, in a workbook of some kB, made a page of gigabytes."""
+    path = tmp_path / name
+    path.write_text(text)
+    with pytest.raises(Invalid, match=r"has a name of 1001 characters; at most 1000 are taken\. It begins: nnnn"):
+        look(path, Wishes())
+
+
 HEADS = {
     "a title": ("Messprotokoll Halle 3\n\nTeil;D35;D40\nA1;35,001;40\n", 3, ("Teil", "D35", "D40")),
     "a title as wide as the table": ("Messprotokoll;;\nTeil;D35;D40\nA1;35,001;40\n", 2, ("Teil", "D35", "D40")),
