@@ -11,12 +11,25 @@ from typing import Any
 
 import pytest
 
-from app.core import number_text
+from app import logs
+from app.core import fits, natural, number_text
+from app.core.printed_line import LineReader
+from app.core.rotary import results
 from app.errors import Invalid
 from app.files.formats import aqdef, aqdef_times, aqdef_values, cell_values, delimited, markup, units
 from app.files.formats.aqdef import Source
 from app.files.formats.rotary_protocol import read_protocol
+from app.geometry.alignment import form_reader as alignment
+from app.geometry.geometric_form import form_reader as geometric_form
+from app.geometry.rotary_axes import form_reader as rotary_axes
+from app.geometry.work_zero import form_reader as work_zero
+from app.loop.calibration import form_reader as calibration
+from app.loop.programs import queries as programs
 from app.loop.readings.importing.layout import Wishes, look
+from app.quality.control_charts import form_reader as control_charts
+from app.quality.control_charts.counts_pages import typed
+from app.quality.gauge_studies import table_reader
+from app.web import forms
 
 MOST = 3.0  # s of a processor
 LONG = 100_000  # characters: a cell of CSV may have 131,072
@@ -61,6 +74,49 @@ def test_what_is_made_of_a_cell(call: Callable[[str], Any]) -> None:
         long = text * (LONG // len(text)) + "x"
         with suppress(units.UnknownUnit):
             assert seconds(call, long) < MOST, text
+
+
+@pytest.mark.parametrize(
+    "call",
+    [
+        table_reader.cells_of,
+        lambda text: alignment.line(text, 1),
+        lambda text: geometric_form.sections(text, "touches"),
+        lambda text: work_zero.fields({"lines": text[: work_zero.MOST_LETTERS]}),
+        lambda text: rotary_axes.run({"as": "positions", "positions": text}),
+        results.read_results,
+        calibration.lengths,
+        control_charts.runs,
+        lambda text: typed(text, ""),
+        forms.whole_numbers,
+        fits.fit_of,
+        natural.looks_natural,
+        programs.guessed,
+        logs.without_secrets,
+        lambda text: LineReader().feed(text.encode()),
+    ],
+)
+def test_what_is_pasted_printed_or_sent(call: Callable[[str], Any]) -> None:
+    for text in (
+        *TEXTS,
+        "\t",
+        "1\t",
+        "1\n",
+        "QS144=",
+        "R1=",
+        "#501=",
+        "Z1\n",
+        "1-2 a\n",
+        "INBLINE",
+        "/import/",
+        "password=",
+    ):
+        for long in (text * (LONG // 5 // len(text)), "1" + text * (LONG // 5 // len(text)) + "\x00"):
+            assert seconds(call, long) < MOST / 6, text
+
+
+def test_a_pasted_row_of_empty_cells() -> None:
+    assert seconds(table_reader.cells_of, "1" + "\t" * LONG) < MOST / 6
 
 
 HEADS = "".join(f"K2001/{index} D{index}\n" for index in range(1, 9_001))

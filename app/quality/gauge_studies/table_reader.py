@@ -57,9 +57,8 @@ def cells_of(text: str) -> list[list[str]]:
     except csv.Error:  # a quotation mark that is never closed: take the lines as they are
         table = [[cell.strip() for cell in line.split(_delimiter(text))] for line in text.split("\n")]
     table = [row for row in table if any(row)]
-    while table and all(not row[-1] for row in table) and len(table[0]) > 1:
-        table = [row[:-1] for row in table]
-    return table
+    empty = min((next(at for at, cell in enumerate(reversed(row)) if cell) for row in table), default=0)
+    return [row[: len(row) - empty] for row in table]
 
 
 def _delimiter(text: str) -> str:
