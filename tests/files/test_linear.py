@@ -23,7 +23,6 @@ from app.geometry.alignment import form_reader as alignment
 from app.geometry.geometric_form import form_reader as geometric_form
 from app.geometry.rotary_axes import form_reader as rotary_axes
 from app.geometry.work_zero import form_reader as work_zero
-from app.loop.calibration import form_reader as calibration
 from app.loop.programs import queries as programs
 from app.loop.readings.importing.layout import Wishes, look
 from app.quality.control_charts import form_reader as control_charts
@@ -85,7 +84,7 @@ def test_what_is_made_of_a_cell(call: Callable[[str], Any]) -> None:
         lambda text: work_zero.fields({"lines": text[: work_zero.MOST_LETTERS]}),
         lambda text: rotary_axes.run({"as": "positions", "positions": text}),
         results.read_results,
-        calibration.lengths,
+        forms.lengths,
         control_charts.runs,
         lambda text: typed(text, ""),
         forms.whole_numbers,
