@@ -17,7 +17,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable, Iterator
-from contextlib import AbstractContextManager, contextmanager
+from contextlib import AbstractContextManager, contextmanager, suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 from tempfile import mkdtemp
@@ -100,6 +100,18 @@ BROWSER_OPTIONS = [
 
 # --- the database
 
+OF_ALL = {
+    # No test pulls the plug: nobody waits for a disk that others write to, and as little as possible is written to it.
+    "fsync": "off",
+    "synchronous_commit": "off",
+    "full_page_writes": "off",
+    "wal_level": "minimal",
+    "max_wal_senders": "0",
+    "max_connections": "500",  # of the servers of several workers, each with its pool
+    "log_lock_waits": "on",  # who waited for whose lock is in its log
+}
+"""Settings of the PostgreSQL of this run."""
+
 
 @pytest.fixture(scope="session")
 def shared_dir(tmp_path_factory: pytest.TempPathFactory) -> Path:
@@ -111,8 +123,7 @@ def shared_dir(tmp_path_factory: pytest.TempPathFactory) -> Path:
 @pytest.fixture(scope="session")
 def postgres(shared_dir: Path) -> Iterator[str]:
     """The server of this run; the URL of a database that no test uses."""
-    # No test pulls the plug; servers of several workers, each with its pool; who waited for whose lock is in its log.
-    server = EmbeddedServer(shared_dir / "inband", {"fsync": "off", "max_connections": "500", "log_lock_waits": "on"})
+    server = EmbeddedServer(shared_dir / "inband", OF_ALL)
     url = server.start()
     follow(server.log)
     try:
@@ -326,7 +337,7 @@ class Server:
         """An HTTP client of this server; with ``key`` it calls as that key's owner."""
         if key is not None:
             headers["Authorization"] = f"Bearer {key}"
-        client = httpx.Client(base_url=self.url, headers=headers, timeout=30, verify=TLS)
+        client = httpx.Client(base_url=self.url, headers=headers, timeout=60, verify=TLS)
         self._clients.append(client)
         return client
 
@@ -353,7 +364,7 @@ class Server:
     def stop(self) -> int:
         """SIGTERM, as a service manager ends it; the exit status."""
         self.process.terminate()
-        return self.process.wait(30)
+        return self.process.wait(60)
 
     def restart(self) -> None:
         """After ``kill`` or ``stop``: the same address, the same database."""
@@ -374,12 +385,24 @@ class Server:
                 self.kill()
 
 
+def _ports() -> Iterator[int]:
+    """Ports below those that the system gives out by itself; each worker of a run has some of its own."""
+    worker, each = int(os.environ.get("PYTEST_XDIST_WORKER", "gw0")[2:]) % 8, 2_000
+    for number in itertools.count(os.getpid()):
+        yield 16_000 + worker * each + number % each
+
+
+_next_ports = _ports()
+
+
 def free_port() -> int:
-    """A loopback port that nobody listens on at this moment."""
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        port: int = probe.getsockname()[1]
-        return port
+    """A loopback port that nobody listens on, and that nobody is given before the server for it has started."""
+    for port in _next_ports:
+        with socket.socket() as probe, suppress(OSError):
+            probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+            probe.bind(("127.0.0.1", port))
+            return port
+    raise AssertionError
 
 
 def wait_ready(url: str, process: Process, stderr: Path, seconds: float = 180) -> None:
@@ -402,10 +425,11 @@ RunServer = Callable[..., AbstractContextManager[Server]]
 
 
 @pytest.fixture(scope="session")
-def run_server(new_database: NewDatabase, tmp_path_factory: pytest.TempPathFactory) -> RunServer:
+def run_server(postgres: str, new_database: NewDatabase, tmp_path_factory: pytest.TempPathFactory) -> RunServer:
     """``with run_server() as server``: a server on a fresh database; ``run_server(url, log_format="json")`` on one that exists.
 
     It has the environment of the moment at which it starts. With ``forked=False`` it starts from nothing, as people start it.
+    With the PostgreSQL of all tests, which nobody kills, it is patient: that one is slow where the computer is.
     """
 
     @contextmanager
@@ -419,8 +443,10 @@ def run_server(new_database: NewDatabase, tmp_path_factory: pytest.TempPathFacto
         for option, value in options.items():
             command += [f"--{option.replace('_', '-')}", str(value)]
 
+        patient = {"INBAND_DATABASE_PATIENCE": "30"} if urlsplit(url).query == urlsplit(postgres).query else {}
+
         def start() -> Process:
-            process = Forked(command, stderr) if forked else begun(command, stderr)
+            process = Forked(command, stderr, environment=patient | os.environ) if forked else begun(command, stderr)
             wait_ready(f"http://127.0.0.1:{port}", process, stderr)
             return process
 

@@ -27,8 +27,8 @@ def test_a_database_is_new(database: Database, _: int) -> None:
 def test_a_page_may_not_complain_nor_call_elsewhere(page: Page, server: Server, complaints: list[str]) -> None:
     page.goto("/health/live")
     page.evaluate("console.error('broken')")
-    page.evaluate("setTimeout(() => { throw new Error('uncaught') })")
-    page.wait_for_timeout(200)
+    with page.expect_event("pageerror"):
+        page.evaluate("setTimeout(() => { throw new Error('uncaught') })")
     page.goto(elsewhere := f"{server.url}/health/live".replace("127.0.0.1", "localhost"))
     page.goto("about:blank")
     found = "\n".join(complaints)

@@ -19,7 +19,7 @@ from inband_client import AsyncClient
 from tests.conftest import TLS
 from tests.shop import Shop
 
-PATIENCE = 30.0  # s: of a machine under load
+PATIENCE = 60.0  # s: of a machine under load
 
 
 class ModelRegisters:

@@ -54,6 +54,22 @@ def kill(node: EmbeddedServer) -> None:
     wait_for(lambda: not any(Path(f"/proc/{child}").exists() for child in children), "all of its processes are gone")
 
 
+def commits_wait_for(url: str, names: str) -> None:
+    """From now on each commit of this server waits for these standbys (`synchronous_standby_names`); for none if empty."""
+    with psycopg.connect(url, autocommit=True) as connection:
+        connection.execute(f"ALTER SYSTEM SET synchronous_standby_names = '{names}'")
+        connection.execute("SELECT pg_reload_conf()")
+        for _ in range(2):  # the checkpointer tells the others, between two checkpoints
+            wait_for(lambda: _shown(url) == names, "new connections know")
+            connection.execute("CHECKPOINT")
+
+
+def _shown(url: str) -> str:
+    with psycopg.connect(url, autocommit=True) as connection:
+        row = connection.execute("SHOW synchronous_standby_names").fetchone()
+        return str(row and row[0])
+
+
 class Cluster:
     """So many servers."""
 
@@ -94,12 +110,9 @@ class Cluster:
         self.quorum = quorum
         names = f"ANY 1 ({', '.join(node.data_dir.name for node in self.nodes)})" if quorum else ""
         for node in self.nodes:
-            with psycopg.connect(node.url, autocommit=True) as connection:
-                connection.execute(f"ALTER SYSTEM SET synchronous_standby_names = '{names}'")
-                connection.execute("SELECT pg_reload_conf()")
+            commits_wait_for(node.url, names)
         states = "SELECT count(*) FROM pg_stat_replication WHERE sync_state = 'quorum'"
         wait_for(lambda: self.ask(self.primary, states) == (len(self.nodes) - 1) * quorum, "they know")
-        time.sleep(0.3)  # every backend has heard of it
 
     def mend(self) -> None:
         """Bring back whoever is away; there must be one that is written to."""

@@ -1,9 +1,13 @@
 """What a page is looked at for: width, the rules of axe-core (WCAG 2.2 A and AA, best practices), targets, contrast."""
 
+from collections.abc import Callable
+from contextlib import suppress
 from typing import Any, Literal
 
 from axe_playwright_python.base import AXE_SCRIPT
-from playwright.sync_api import Page, expect
+from playwright.sync_api import Locator, Page, expect
+
+from tests.waits import until
 
 LIMIT = 20_000  # ms; charts are drawn anew, and the computer may have other work
 
@@ -32,8 +36,32 @@ def opened(page: Page, address: str) -> None:
     assert answer is not None
     assert answer.status == 200, address
     expect(page.locator("main")).to_be_visible()
-    for chart in page.locator("plotly-chart").all():
-        expect(chart.locator(".main-svg").first).to_be_attached()
+    drawn(page)
+
+
+def drawn(page: Page, charts: str = "plotly-chart") -> None:
+    """Wait until these charts are drawn and hear what is done to them. Their first lines may be there before."""
+    until(
+        lambda: page.evaluate("charts => [...document.querySelectorAll(charts)].every((chart) => chart.drawn)", charts)
+    )
+
+
+def live(page: Page) -> None:
+    """Wait until the page is told what happens. What happened while it was on its way it may never hear."""
+    expect(page.locator("live-status")).to_have_attribute("state", "live")
+
+
+def until_shown(part: Locator, touch: Callable[[], None]) -> None:
+    """Touch a place of the screen until this is seen. Between measuring and touching, what lies there may move."""
+
+    def shown() -> bool:
+        touch()
+        with suppress(AssertionError):
+            expect(part).to_be_visible(timeout=2_000)
+            return True
+        return False
+
+    until(shown)
 
 
 def resize(page: Page, size: str) -> None:

@@ -11,6 +11,7 @@ import pytest
 from playwright.sync_api import Locator, Page, expect
 
 from tests.conftest import Server
+from tests.pages.looks import drawn, live, until_shown
 from tests.shop import Person, Shop
 
 pytestmark = pytest.mark.own_server  # everybody begins at the plant page, which shows a plant and no crowd
@@ -33,10 +34,6 @@ class Hands:
     def tap(self, what: Locator) -> None:
         self.count += 1
         what.tap()
-
-    def tap_at(self, x: float, y: float) -> None:
-        self.count += 1
-        self.page.touchscreen.tap(x, y)
 
     def click(self, what: Locator) -> None:
         self.count += 1
@@ -84,7 +81,7 @@ def floor(server: Server) -> Shop:
 def at_the_plant(page: Page, person: Person) -> Hands:
     person.sign_in(page)
     page.goto("/")
-    expect(page.locator("live-status")).to_have_attribute("state", "live")
+    live(page)
     return Hands(page)
 
 
@@ -149,9 +146,10 @@ class TestByTouch:
         hands = at_the_plant(page, operator)
         hands.tap(name(page, floor))
         chart = page.locator("plotly-chart.zones")
-        expect(chart).to_have_attribute("tabindex", "0")
+        drawn(page)
         chart.scroll_into_view_if_needed()
-        hands.tap_at(*chart.evaluate(PLACE_OF_LAST))
+        hands.count += 1
+        until_shown(chart.locator(".chart-panel"), lambda: page.touchscreen.tap(*chart.evaluate(PLACE_OF_LAST)))
         expect(chart.locator(".chart-panel")).to_contain_text("beyond the averaging limit 5.0 µm: corrected in full.")
         assert hands.count == 2
 

@@ -200,9 +200,10 @@ class TestOverview:
         page.fill("[name=name]", "Mira")
         page.fill("[name=password]", PASSWORD)
         page.click("button:has-text('Sign in')")
-        assert violations(page) == {}
         row = page.locator("tr", has_text="North")
         expect(row.locator("td").nth(1)).to_contain_text("1")
+        page.wait_for_load_state()
+        assert violations(page) == {}
         expect(page.locator("tr", has_text="South")).not_to_contain_text("not signed in")
         row.get_by_role("link").click()
         expect(page).to_have_url(f"{server.url}/p/north/")

@@ -15,7 +15,7 @@ from tests.conftest import TLS, free_port
 from tests.web.showcase import Stage, showcase
 
 
-def until(page: Page, expression: str, seconds: float = 15) -> None:
+def until(page: Page, expression: str, seconds: float = 60) -> None:
     """Until the expression is true in the page. (Playwright's own waiting needs eval, which our policy forbids.)"""
     deadline = time.monotonic() + seconds
     while not page.evaluate(expression):

@@ -70,7 +70,7 @@ class Listener:
             pass
         self.queue.put(None)
 
-    def next(self, kind: str | None = None, seconds: float = 30) -> Event:
+    def next(self, kind: str | None = None, seconds: float = 60) -> Event:
         """The next event (of this kind); heartbeats, marks and the greeting are passed over."""
         deadline = time.monotonic() + seconds
         while True:
@@ -83,7 +83,7 @@ class Listener:
     def until(self, number: int) -> list[Event]:
         """What is told until this mark."""
         told: list[Event] = []
-        while (event := self.queue.get(timeout=30)) is not None:
+        while (event := self.queue.get(timeout=60)) is not None:
             if event.kind == "mark" and event.data["number"] == number:
                 return told
             told += [event] if event.kind not in PASSED_OVER else []
@@ -91,9 +91,9 @@ class Listener:
 
     def tells(self, kind: str) -> bool:
         """Tell if an event of this kind comes before the server ends the stream."""
-        return any(event.kind == kind for event in iter(lambda: self.queue.get(timeout=30), None))
+        return any(event.kind == kind for event in iter(lambda: self.queue.get(timeout=60), None))
 
-    def ends(self, seconds: float = 30) -> bool:
+    def ends(self, seconds: float = 60) -> bool:
         """Tell if the server ends the stream; messages until then are skipped."""
         deadline = time.monotonic() + seconds
         try:

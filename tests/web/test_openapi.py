@@ -583,7 +583,7 @@ class TestPage:
         page.get_by_label("Name").fill("Dora")
         page.locator("input[type=password]").fill(password)
         page.locator("main button[type=submit]").click()
-        page.goto("/")
+        page.wait_for_url(f"{server.url}/")
         page.get_by_role("contentinfo").get_by_role("link", name="API").click()
         expect(page.get_by_role("heading", level=1)).to_have_text("API")
         expect(page.get_by_role("banner")).to_contain_text("Dora")

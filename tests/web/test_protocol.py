@@ -74,7 +74,7 @@ def port() -> Iterator[int]:
 
 def connected(port: int) -> socket.socket:
     client = socket.create_connection(("127.0.0.1", port))
-    client.settimeout(20)
+    client.settimeout(60)
     return client
 
 
@@ -139,14 +139,14 @@ def test_a_body_that_falls_silent_is_let_go(port: int) -> None:
 
 
 def test_a_slow_body_and_a_slow_answer_are_waited_for(port: int, monkeypatch: pytest.MonkeyPatch) -> None:
-    patience = 2.0  # a busy computer may lay a pause of its own between two bytes
+    patience = 4.0  # a busy computer may lay a pause of its own between two bytes
     monkeypatch.setattr(Impatient, "body_patience", patience)
     with connected(port) as client:
-        client.sendall(b"POST /slow HTTP/1.1\r\nHost: x\r\nConnection: close\r\nContent-Length: 8\r\n\r\n")
-        for _ in range(8):
-            time.sleep(patience / 6)
-            client.sendall(b"x")
-        assert heard(client).partition(b"\r\n\r\n")[2] == b"1\r\n8\r\n0\r\n\r\n"
+        client.sendall(b"POST /slow HTTP/1.1\r\nHost: x\r\nConnection: close\r\nContent-Length: 16\r\n\r\n")
+        for _ in range(4):
+            time.sleep(patience / 3.5)
+            client.sendall(b"xxxx")
+        assert heard(client).partition(b"\r\n\r\n")[2] == b"2\r\n16\r\n0\r\n\r\n"
 
 
 def test_a_body_that_drips_in_is_let_go(port: int, monkeypatch: pytest.MonkeyPatch) -> None:

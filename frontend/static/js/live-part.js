@@ -8,12 +8,15 @@
 //   every seconds between two looks where no event tells of a change
 //
 // What the reader is doing is kept: focus, selection, opened <details> (those with an id or data-key), scrolling.
-// While he types in it or has a dialog of it open, it waits. If fetching fails it says so and how old the content is.
+// While he types in it, presses something in it or has a dialog of it open, it waits. If fetching fails it says so and how
+// old the content is.
 // Fires "livepart" (bubbles) after each swap.
 
 import { coalesced } from "./coalesce.js";
 import { afterEvent, subscribe } from "./live.js";
 import { age } from "./times.js";
+
+const PRESS = 1_500; // ms from the first touch on; what is swapped between press and release would never be clicked
 
 const key = (element) => element.id || element.dataset.key || element.name || "";
 const same = (root, name, type) =>
@@ -22,6 +25,7 @@ const same = (root, name, type) =>
 class LivePart extends HTMLElement {
   connectedCallback() {
     this.fetched = Date.now();
+    this.addEventListener("pointerdown", this.onPress ??= () => (this.pressed = performance.now()), true);
     this.refresh = coalesced(() => this.load());
     this.stop = subscribe(this.getAttribute("on"), () => this.refresh());
     if (this.hasAttribute("now")) this.refresh();
@@ -37,7 +41,8 @@ class LivePart extends HTMLElement {
   get busy() {
     const active = document.activeElement;
     const typing = this.contains(active) && active.matches("input:not([type=hidden]), textarea, select");
-    return typing || this.querySelector("dialog[open]") !== null;
+    const pressing = performance.now() - this.pressed < PRESS;
+    return typing || pressing || this.querySelector("dialog[open]") !== null;
   }
 
   async load() {

@@ -64,7 +64,7 @@ class SearchBox extends HTMLElement {
   }
 
   show(items) {
-    this.chosen = -1;
+    const chosen = this.list.querySelectorAll("a")[this.chosen]?.href; // an answer that comes late takes no choice away
     this.list.replaceChildren(...items.map((item, at) => {
       const option = document.createElement("li");
       option.id = `search-hit-${at}`;
@@ -87,7 +87,19 @@ class SearchBox extends HTMLElement {
     }
     this.list.hidden = false;
     this.input.setAttribute("aria-expanded", "true");
-    this.input.removeAttribute("aria-activedescendant");
+    this.choose([...this.list.querySelectorAll("a")].findIndex((link) => link.href === chosen));
+  }
+
+  get options() {
+    return [...this.list.querySelectorAll("[role=option]:not([aria-disabled])")];
+  }
+
+  choose(at) { // -1: none
+    this.chosen = at;
+    for (const [place, option] of this.options.entries()) option.setAttribute("aria-selected", place === at);
+    this.options[at]?.scrollIntoView({ block: "nearest" });
+    if (at < 0) this.input.removeAttribute("aria-activedescendant");
+    else this.input.setAttribute("aria-activedescendant", this.options[at].id);
   }
 
   close() {
@@ -95,11 +107,11 @@ class SearchBox extends HTMLElement {
     this.asked = null;
     this.list.hidden = true;
     this.input.setAttribute("aria-expanded", "false");
-    this.input.removeAttribute("aria-activedescendant");
+    this.choose(-1);
   }
 
   press(event) {
-    const options = [...this.list.querySelectorAll("[role=option]:not([aria-disabled])")];
+    const { options } = this;
     if (event.key === "Escape") {
       event.preventDefault();
       if (this.list.hidden) this.input.blur();
@@ -107,10 +119,7 @@ class SearchBox extends HTMLElement {
     } else if ((event.key === "ArrowDown" || event.key === "ArrowUp") && !this.list.hidden && options.length) {
       event.preventDefault();
       const step = event.key === "ArrowDown" ? 1 : -1;
-      this.chosen = (this.chosen + step + options.length + (this.chosen < 0 && step < 0 ? 1 : 0)) % options.length;
-      for (const [at, option] of options.entries()) option.setAttribute("aria-selected", at === this.chosen);
-      options[this.chosen].scrollIntoView({ block: "nearest" });
-      this.input.setAttribute("aria-activedescendant", options[this.chosen].id);
+      this.choose((this.chosen + step + options.length + (this.chosen < 0 && step < 0 ? 1 : 0)) % options.length);
     } else if (event.key === "Enter" && !this.list.hidden && this.chosen >= 0) {
       event.preventDefault();
       options[this.chosen].querySelector("a").click();

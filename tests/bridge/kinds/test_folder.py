@@ -669,7 +669,7 @@ def test_every_part_of_the_simulated_machine_arrives_once(tmp_path: Path) -> Non
         await simulator.start()
         table = simulator.table()
         settings: Any = table["folder"]
-        chosen = machine(inbox, names={"D1": "shaft-1"}, **settings | {"every": 0.05, "settle": 0.3})
+        chosen = machine(inbox, names={"D1": "shaft-1"}, **settings | {"every": 0.05, "settle": 3600.0})
         parts = 15
         for _ in range(3):
             async with fetching(chosen, store):

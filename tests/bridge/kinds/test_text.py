@@ -107,12 +107,12 @@ def test_what_is_wrong_goes_to_the_quarantine_with_its_line() -> None:
 def test_an_expression_that_takes_for_ever_is_given_up(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("app.bridge.patterns.LONGEST_SEARCH", 0.05)
     slow = (r"^(?P<measured>(?:\d|\d\d)+)$",)
-    began = time.monotonic()
+    began = time.thread_time()
     with pytest.raises(TooSlow, match="make it simpler"):
         Patterns(slow).find("1" * 60 + "!")
     [found] = printed(b"1" * 60 + b"!\n", lines=slow)
     assert "takes longer than" in str(found.fault)
-    assert time.monotonic() - began < 5
+    assert time.thread_time() - began < 5, "seconds of the processor"
 
 
 @pytest.mark.parametrize(

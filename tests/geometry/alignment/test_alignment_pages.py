@@ -40,6 +40,7 @@ class TestInABrowser:
         operator.sign_in(page)
         page.goto("/alignments")
         page.get_by_role("link", name="Align a part").first.click()
+        page.wait_for_url("**/alignments/new**")  # and for its scripts
         page.get_by_label("Machine").select_option(shop.machine)
         page.get_by_label("Name of the set-up").fill("pallet 4")
         page.get_by_label("Repeatability").fill("2")
@@ -59,7 +60,7 @@ class TestInABrowser:
         expect(page.locator("main")).to_contain_text("The points locate the part well")
         expect(page.locator("main")).to_contain_text("One more point near")
         expect(page.get_by_label("Text for Sinumerik")).to_have_value(re.compile(r"CTRANS\(X,.*:CROT\("))
-        expect(page.locator("plotly-chart .main-svg").first).to_be_visible(timeout=30_000)
+        expect(page.locator("plotly-chart .main-svg").first).to_be_visible()
         expect(page.locator("table.touches tbody tr")).to_have_count(6)
 
         # The same pallet again, a little elsewhere: its history has both.
@@ -70,7 +71,7 @@ class TestInABrowser:
         page.get_by_role("button", name="Align and save").click()
         page.get_by_role("link", name="History of pallet 4").click()
         expect(page.locator("tbody tr")).to_have_count(2)
-        expect(page.locator("plotly-chart .main-svg").first).to_be_visible(timeout=30_000)
+        expect(page.locator("plotly-chart .main-svg").first).to_be_visible()
 
     def test_the_touch_that_does_not_fit_is_named_and_left_out(self, shop: Shop, operator: Person, page: Page) -> None:
         operator.sign_in(page)

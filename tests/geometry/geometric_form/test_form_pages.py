@@ -27,7 +27,7 @@ class TestInABrowser:
         told = page.get_by_role("alert").filter(has_text="Suspect point")
         expect(told).to_contain_text("Section 2, point 1")
         expect(told).to_contain_text("With X near 23.898")
-        expect(page.locator("plotly-chart .main-svg").first).to_be_visible(timeout=30_000)
+        expect(page.locator("plotly-chart .main-svg").first).to_be_visible()
         expect(page.get_by_text("suspect", exact=True)).to_have_count(1)
 
         # Put right, from what is there already.
@@ -41,7 +41,7 @@ class TestInABrowser:
 
         page.get_by_role("link", name="Trend").click()
         expect(page.locator("tbody tr")).to_have_count(2)
-        expect(page.locator("plotly-chart .main-svg").first).to_be_visible(timeout=30_000)
+        expect(page.locator("plotly-chart .main-svg").first).to_be_visible()
         page.goto("/forms")
         expect(page.get_by_role("row").filter(has_text=feature)).to_contain_text("Not good")
 

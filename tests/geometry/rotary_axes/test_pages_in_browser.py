@@ -8,6 +8,7 @@ from playwright.sync_api import Page, expect
 
 from tests.geometry.rotary_axes.bench import RADIUS, axis, protocol
 from tests.geometry.rotary_axes.walking import grid, last_month, machine, runs, take
+from tests.pages.looks import drawn, live
 from tests.shop import Person, Shop
 
 pytestmark = pytest.mark.usefixtures("signed_in")
@@ -22,8 +23,8 @@ def signed_in(engineer: Person, page: Page) -> None:
 def chart(page: Page, source: str) -> list[str]:
     """Text in a chart, once it is drawn."""
     found = page.locator(f'plotly-chart[src*="{source}"]')
-    expect(found.locator(".main-svg").first).to_be_attached()
     expect(found.locator("text").first).to_be_attached()
+    drawn(page, f'plotly-chart[src*="{source}"]')
     texts: list[str] = found.evaluate("chart => [...chart.querySelectorAll('text')].map((text) => text.textContent)")
     return [text.replace("\N{NO-BREAK SPACE}", " ") for text in texts]
 
@@ -127,6 +128,7 @@ def test_the_drift_is_followed_and_a_value_chosen(shop: Shop, page: Page) -> Non
     assert "EX0C, µm" in chart(page, "drift-figure")
     page.get_by_role("link", name="backlash of C").or_(page.get_by_role("link", name="EY0C")).first.click()
     expect(page.locator("plotly-chart.drift")).to_have_attribute("src", re.compile("value=EY0C"))
+    live(page)
     take(shop, axes=[axis((0.001, 0, 0, 0), seed=9)], ball_radius=RADIUS)
     expect(page.locator("#run-list tbody tr")).to_have_count(4)  # without loading the page again
 

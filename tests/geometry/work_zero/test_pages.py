@@ -5,10 +5,8 @@ from typing import Any
 
 from playwright.sync_api import Page, expect
 
-from tests.pages.looks import boxes
+from tests.pages.looks import boxes, live
 from tests.shop import Person, Shop
-
-SLOW = 20_000  # ms, for charts on a busy computer
 
 
 def type_pocket(page: Page, shop: Shop, shift: float = 0.0) -> None:
@@ -28,6 +26,7 @@ class TestAtThePanel:
         page.get_by_role("navigation", name="Of all machines").get_by_role("link", name="Work zero").click()
         page.get_by_role("link", name="Probe a part").first.click()
         page.get_by_role("navigation", name="Shape").get_by_role("link", name="Pocket").click()
+        page.wait_for_url("**kind=pocket**")  # and for its scripts
         type_pocket(page, shop)
         # The keypad has no minus: the number is typed, its sign put on.
         first = page.get_by_role("group", name="Point 1")
@@ -120,7 +119,7 @@ class TestAVice:
             page.get_by_role("button", name="Compute the zero and save").click()
             expect(page.get_by_role("heading", level=1)).to_contain_text("G54")
         page.get_by_role("link", name="History of vice").click()
-        expect(page.locator("plotly-chart .main-svg").first).to_be_visible(timeout=SLOW)
+        expect(page.locator("plotly-chart .main-svg").first).to_be_visible()
         expect(page.locator(".found")).to_contain_text("No limit is set")
         page.get_by_label("Warning beyond").fill("10")
         page.get_by_label("Alarm beyond").fill("5")
@@ -135,12 +134,13 @@ class TestAVice:
         assert shop.alarms() == []
 
         # Another zero comes from the machine while the page is open: it is told by itself.
+        live(page)
         touches = [{"x": -352.962, "approach": "-X"}, {"x": -258.958, "approach": "+X"}]
         shop.call(
             "POST", "/work-zeros", 201, shop.machine_client,
             machine=shop.machine, kind="pocket", tip=6.0, fixture="vice", touches=touches,
         )  # fmt: skip
-        expect(page.locator(".found")).to_contain_text("Shifted too far", timeout=SLOW)
+        expect(page.locator(".found")).to_contain_text("Shifted too far")
         expect(page.locator("#history tbody tr")).to_have_count(3)
         (alarm,) = shop.alarms()
         assert alarm["kind"] == "fixture_shifted"

@@ -6,6 +6,7 @@ from playwright.sync_api import Page, expect
 from app.loop.connections import wording
 from tests.loop.connections.test_alarms import run, silent_for
 from tests.loop.connections.test_heartbeat import ago, beat
+from tests.pages.looks import live
 from tests.shop import Person, Shop
 
 
@@ -77,6 +78,7 @@ def test_the_page_follows_by_itself(shop: Shop, viewer: Person, page: Page) -> N
     viewer.sign_in(page)
     page.goto(f"/machines/{shop.machine}/connection")
     expect(page.locator("#connection .badge").first).to_have_text("Online")
+    live(page)
     beat(shop, state="wrong_machine", detail="SN-2 answers, not SN-1.")
     expect(page.locator("#connection .badge").first).to_have_text("Wrong machine")
     expect(page.locator("#connection")).to_contain_text("SN-2 answers, not SN-1.")

@@ -7,6 +7,7 @@ import pytest
 from playwright.sync_api import Page, expect
 
 from tests.conftest import Server
+from tests.pages.looks import live
 from tests.shop import Person, Shop
 from tests.views.reports.story import report, table
 
@@ -188,6 +189,6 @@ def test_an_open_chart_shows_what_is_written_meanwhile(running: Shop, server: Se
     page.goto(f"/characteristics/{running.characteristic}")
     chart = page.locator("plotly-chart.zones")
     expect(chart.locator(".main-svg").first).to_be_attached()
-    expect(page.locator("live-status")).to_contain_text("live")
+    live(page)
     write(running, sequence=2, text="Probe cleaned")
     expect(chart.get_by_text("Probe cleaned").first).to_be_attached()

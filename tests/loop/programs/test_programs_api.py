@@ -33,9 +33,9 @@ def written(shop: Shop, key: str, status: int = 200, **query: Any) -> str:
 
 def test_the_control_is_guessed_at_once_however_many_lines_look_like_it() -> None:
     """Nothing else runs while a text is searched: thousands of lines must not each be searched to the end of the text."""
-    begun = time.perf_counter()
+    begun = time.thread_time()
     assert guessed(("#" + " " * 14 + "\n") * 4000) == "sinumerik"
-    assert time.perf_counter() - begun < 1
+    assert time.thread_time() - begun < 2, "seconds of the processor"
     assert guessed("%\nO9011 (BORE)\nN5 # 505 = 40.\n") == "fanuc"
 
 

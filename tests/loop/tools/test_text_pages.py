@@ -6,6 +6,7 @@ from typing import Any
 import pytest
 from playwright.sync_api import Page, expect
 
+from tests.pages.looks import live
 from tests.shop import Person, Shop
 
 
@@ -40,7 +41,7 @@ class TestCorrections:
         operator.sign_in(page)
         page.goto(self.address(shop))
         before = page.locator("#corrections-text").input_value()
-        expect(page.locator("live-status")).to_contain_text("live")
+        live(page)
         shop.read(20.0, correction_in_effect=0)
         expect(page.locator("#newer")).to_contain_text("have changed since")
         assert page.locator("#corrections-text").input_value() == before

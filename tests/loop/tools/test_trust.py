@@ -422,7 +422,7 @@ def _until_somebody_waits(session: Session) -> None:
     waits = text(
         "SELECT count(*) FROM pg_stat_activity WHERE datname = current_database() AND wait_event_type = 'Lock'"
     )
-    deadline = time.monotonic() + 10
+    deadline = time.monotonic() + 60
     while not session.scalar(waits):
         assert time.monotonic() < deadline
         time.sleep(0.02)

@@ -2,9 +2,11 @@
 
 from playwright.sync_api import Page, expect
 
+from tests.pages.looks import live
 from tests.quality.closed_loop import cut, scatter
 from tests.quality.wear.test_wear_api import go, nervous
 from tests.shop import Person, Shop
+from tests.waits import until
 
 
 def test_the_page_says_how_fast_and_how_long(viewer: Person, shop: Shop) -> None:
@@ -48,8 +50,8 @@ def test_what_comes_soon_stands_out_on_the_plant_page(viewer: Person, shop: Shop
     assert "data-near" in text
 
 
-ABOVE_ITS_STRIP = """(chart) => chart.querySelector(".main-svg").getBoundingClientRect().bottom
-  <= chart.querySelector(".chart-strip").getBoundingClientRect().top + 1"""
+ABOVE_ITS_STRIP = """document.querySelector("plotly-chart.wear .main-svg").getBoundingClientRect().bottom
+  <= document.querySelector("plotly-chart.wear .chart-strip").getBoundingClientRect().top + 1"""
 
 
 def test_in_the_browser_the_curve_is_drawn_and_goes_on(viewer: Person, shop: Shop, page: Page) -> None:
@@ -58,12 +60,13 @@ def test_in_the_browser_the_curve_is_drawn_and_goes_on(viewer: Person, shop: Sho
     page.goto(f"/characteristics/{shop.characteristic}")
     curve = page.locator("plotly-chart.wear")
     curve.scroll_into_view_if_needed()
-    expect(curve.locator(".main-svg").first).to_be_visible(timeout=30_000)
+    expect(curve.locator(".main-svg").first).to_be_visible()
     expect(curve).to_contain_text("per part")
     expect(curve.locator(".chart-strip")).to_be_visible()  # the chart gives it room: it would lie over the axis
-    page.wait_for_function(ABOVE_ITS_STRIP, arg=curve.element_handle())
+    until(lambda: page.evaluate(ABOVE_ITS_STRIP))
     page.get_by_role("navigation", name="Readings of the wear curve").get_by_role("link", name="All").click()
     page.wait_for_url("**edge=all**")
     expect(page.locator("#wear")).to_contain_text("over the last 60 readings")
+    live(page)
     shop.read(1.0)
-    expect(page.locator("#wear")).to_contain_text("over the last 61 readings", timeout=30_000)
+    expect(page.locator("#wear")).to_contain_text("over the last 61 readings")

@@ -9,6 +9,7 @@ from sqlalchemy import event
 from app.core.state import CharacteristicState
 from app.views.characteristic import state_queries as queries
 from tests.conftest import RunServer, Server
+from tests.pages.looks import live
 from tests.shop import PARAMETERS, Person, Shop
 
 pytestmark = pytest.mark.own_server
@@ -125,6 +126,7 @@ class TestLive:
         viewer.sign_in(page)
         page.goto("/")
         expect(line(page, shop)).to_contain_text("No readings yet")
+        live(page)
         needed = int(page.locator(".plant-count strong").first.inner_text())
         page.evaluate("window.untouched = true")
         shop.read(12.0)
@@ -138,6 +140,7 @@ class TestLive:
         viewer.sign_in(page)
         page.goto("/")
         expect(line(page, shop)).to_be_visible()
+        live(page)
         shop.add(f"{shop.characteristic}-late", tool_memory=9)
         expect(page.locator(f"#c-{shop.characteristic}-late")).to_be_visible()
 

@@ -376,6 +376,7 @@ class TestPage:
         for key in keys(3):
             page.locator(f"input[value={key}]").check()
         page.get_by_role("button", name="Create reports").click()
+        page.wait_for_url("**/reports#jobs")
         number = bores.call("GET", "/reports")["items"][0]["id"]
         row = page.locator(f"#job-{number}")
         expect(row).to_contain_text("4 characteristics")

@@ -73,7 +73,8 @@ def test_a_refused_order_is_told_at_once_in_the_words_of_the_server(
     assert page.locator("[name=averaging_limit]").get_attribute("aria-invalid") == "true"
     assert page.locator('.limit.wrong[data-limit="averaging_limit"]').count() == 2
     page.fill("[name=reason]", "to see it refused")
-    page.get_by_role("button", name="Save").click()
+    with page.expect_event("load"):
+        page.get_by_role("button", name="Save").click()
     expect(told).to_have_count(1)
     assert (told.text_content() or "").strip() == sentence, "the server says the same"
     assert page.input_value("[name=reason]") == "to see it refused"

@@ -13,6 +13,7 @@ from app.access import devices
 from app.access.identification import FREE
 from app.access.tables import Person as PersonOnRecord
 from tests.conftest import TLS, Server
+from tests.pages.looks import live
 from tests.shop import PASSWORD, Person, Shop
 
 PIN, BADGE = "2746", "0004711882"
@@ -315,12 +316,13 @@ def test_a_scanned_badge_acknowledges_by_two_touches(kiosk: Any, server: Server,
         code = devices.make_code(session, shop.machine, "Kiosk", "tests")
     kiosk.goto(f"/station?code={code}")
     kiosk.get_by_role("button", name="Bind").tap()
-    expect(kiosk.locator("live-status")).to_have_attribute("state", "live")
+    live(kiosk)
     shop.read(12.5)
     kiosk.get_by_role("link", name="Noted").tap()
     expect(kiosk.get_by_label("Scan your badge")).to_be_focused()
     kiosk.keyboard.type(BADGE)
     kiosk.keyboard.press("Enter")
     expect(kiosk.get_by_role("status").filter(has_text=f"Oversize: Noted, {milica.name}")).to_be_visible()
+    live(kiosk)
     shop.read(12.5)  # the stream of the device goes on
     expect(kiosk.locator(".station-alarm h2")).to_contain_text("Oversize")

@@ -69,6 +69,7 @@ def test_what_a_column_means_can_be_changed(at_desk: Page, shop: Shop, tmp_path:
     expect(at_desk.locator(".note")).to_contain_text("No column is recognised")
     at_desk.select_option("select[name=column_measured]", label="b")
     expect(at_desk.locator(".sheet th small")).to_have_text(["Measured value"])
+    at_desk.wait_for_load_state()  # the script that sends what is changed
     at_desk.select_option("#f-column_measured_at", label="c")
     expect(at_desk.locator(".sheet th small")).to_have_count(2)
     at_desk.get_by_role("button", name="Import all").click()
@@ -84,6 +85,7 @@ def test_a_file_in_another_encoding_can_still_be_read(at_desk: Page, shop: Shop,
     at_desk.select_option("select[name=encoding]", "utf-8")
     expect(at_desk.locator(".note").first).to_contain_text("cp1250 for Serbian")
     expect(at_desk.locator("table").first).to_contain_text("Žižek")  # so it would look in cp1250
+    at_desk.wait_for_load_state()  # the script that sends what is changed
     at_desk.select_option("select[name=encoding]", "cp1250")
     expect(at_desk.locator(".sheet")).to_contain_text("Žižek")
 

@@ -18,6 +18,7 @@ from app.core.parameters import read
 from app.db import migrate
 from app.db.embedded import EmbeddedServer
 from tests.conftest import RunServer, Server
+from tests.db.clusters import commits_wait_for
 from tests.loop.readings.load import Sender, all_at_once, scattered
 from tests.loop.readings.record import history, must_be_stored, must_hold, must_replay, rows
 from tests.shop import PARAMETERS, Shop
@@ -299,10 +300,7 @@ class TestDatabase:
     def test_cut_off_after_the_commit_it_is_not_done_again(self, far: Shop, away: EmbeddedServer, batch: bool) -> None:
         """A commit that waits for a standby has happened here; cut off now, nobody hears of it."""
         with psycopg.connect(away.url, autocommit=True) as connection:
-            connection.execute("ALTER SYSTEM SET synchronous_standby_names = 'nobody'")
-            connection.execute("SELECT pg_reload_conf()")
-            until(lambda: rows(away.url, "SHOW synchronous_standby_names") == [("nobody",)])
-            time.sleep(0.3)  # every backend has heard of it
+            commits_wait_for(away.url, "nobody")
             with ThreadPoolExecutor(1) as pool:
                 answer = pool.submit(push, far, batch=batch)
                 until(lambda: rows(away.url, f"SELECT 1 {WRITERS} AND wait_event = 'SyncRep'"))

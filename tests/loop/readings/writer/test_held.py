@@ -31,7 +31,10 @@ from tests.loop.readings.writer.test_broken import until
 from tests.loops import run
 from tests.shop import PARAMETERS
 
-PATIENCE = 2.0  # s
+LONG, SHORT = (
+    60.0,
+    1.0,
+)  # s of patience: where somebody gets what he waits for, however slow the computer is, and where not
 WAITING = "SELECT 1 FROM pg_stat_activity WHERE datname = current_database() AND wait_event_type = 'Lock'"
 EVENTS = "SELECT pg_advisory_xact_lock(7291, 'event'::regclass::oid::int4)"
 
@@ -49,13 +52,18 @@ def plant(database: Database, count: int = 2) -> list[Entry]:
     return [entry for entry in found if entry is not None]
 
 
-def impatient(database: Database) -> Database:
-    return Database(database.dsn, pool_size=1, connections=Connections(database.dsn, PATIENCE))
+def with_patience(database: Database, seconds: float) -> Database:
+    return Database(database.dsn, pool_size=1, connections=Connections(database.dsn, seconds))
+
+
+def waits(writer: Writer, seconds: float) -> None:
+    """Readings from now on are waited for so long."""
+    writer._patience = writer._store.connection.patience = seconds
 
 
 @asynccontextmanager
 async def writing(database: Database) -> AsyncIterator[Writer]:
-    own = impatient(database)
+    own = with_patience(database, LONG)
     writer = Writer(own)
     writer.start()
     yield writer
@@ -96,17 +104,17 @@ def test_the_others_go_on_and_the_held_one_is_told_the_truth(database: Database)
         async with writing(database) as writer:
             await asyncio.gather(*(writer.submit(*reading(each, "0")) for each in (one, other)))
             connection = await holding(database.dsn, one)
-            held = writer.submit(*reading(one, "1"))
-            for number in range(1, 30):
-                assert isinstance(await writer.submit(*reading(other, str(number))), Verdict)
-            assert not held.done(), "the others have waited for it"
-            refused = await held
+            waits(writer, SHORT)
+            refused = await writer.submit(*reading(one, "1"))
             assert isinstance(refused, Busy), refused
             assert (refused.status, refused.kind, refused.retry_after) == (503, "busy", 2)
             assert refused.detail.startswith("Other work has held the machine lathe-0 for longer")
+            waits(writer, LONG)
             behind = [writer.submit(*reading(one, str(number))) for number in (1, 2, 3)]
             await come_to(lambda: rows(database.dsn, WAITING))
-            assert isinstance(await writer.submit(*reading(other, "30")), Verdict)
+            for number in range(1, 31):
+                assert isinstance(await writer.submit(*reading(other, str(number))), Verdict)
+            assert not any(outcome.done() for outcome in behind), "the others have waited for it"
             assert keys(database, one) == ["0"], "it was said that nothing was stored"
             await connection.close()
             assert [sequence(outcome) for outcome in await asyncio.gather(*behind)] == [2, 3, 4]
@@ -168,27 +176,31 @@ def test_what_all_need_is_waited_for_and_refused_in_time(database: Database) -> 
             await connection.rollback()
             assert isinstance(await outcome, Verdict)
             await connection.execute(EVENTS)
+            waits(writer, SHORT)
             refused = await writer.submit(*reading(one, "1"))
             assert isinstance(refused, Busy), refused
             assert "what this request needs" in refused.detail or "lathe-0" in refused.detail
             await connection.rollback()
+            waits(writer, LONG)
             assert sequence(await writer.submit(*reading(one, "1"))) == 2
 
     run(go())
     assert keys(database, one) == ["0", "1"]
 
 
-def lost_commit(database: Database, matter: Callable[[Database], AbstractAsyncContextManager[None]]) -> Any:
+def lost_commit(
+    database: Database, matter: Callable[[Database], AbstractAsyncContextManager[None]], patience: float = LONG
+) -> Any:
     """The answer to how a commit ended of which nobody heard. matter: what is in the way when it is asked."""
     (one,) = plant(database, 1)
 
     async def go() -> Any:
-        own = impatient(database)
+        own = with_patience(database, patience)
         store = ReadingStore(own, {})
         outcomes = await store.store([reading(one, "k")])
         await store.close()
         async with matter(own):
-            asking = asyncio.ensure_future(store._find_out(CommitLost(outcomes), monotonic() + PATIENCE))
+            asking = asyncio.ensure_future(store._find_out(CommitLost(outcomes), monotonic() + patience))
         found = await asking
         await store.close()
         own.close()
@@ -218,7 +230,7 @@ def test_how_a_commit_ended_is_asked_until_the_patience_is_over(database: Databa
         await asyncio.sleep(0.5)
         own.connections.silent = not heard
 
-    (found,) = lost_commit(database, silent_for_a_while)
+    (found,) = lost_commit(database, silent_for_a_while, LONG if heard else SHORT)
     assert isinstance(found, Verdict if heard else OutcomeUnknown)
 
 
