@@ -15,6 +15,7 @@ import pytest
 from sqlalchemy import text
 
 from app.access.callers import Caller
+from app.db.connections import LIMITS
 from app.db.engine import Database
 from app.errors import Conflict, Invalid, NotFound
 from app.loop.characteristics import actions as characteristics
@@ -278,7 +279,14 @@ def test_a_long_file_takes_little_memory(plant: Database, tmp_path: Path, count:
     assert scalar(plant, "SELECT max(sequence) FROM reading") == count + 1000
 
 
-def test_the_machine_goes_on_while_its_past_is_imported(shop: Shop, tmp_path: Path) -> None:
+HELD_UP = """SELECT 1 FROM pg_stat_activity WHERE application_name = 'inband-readings' AND datname = current_database()
+    AND wait_event_type = 'Lock'"""
+
+
+def test_the_machine_goes_on_while_its_past_is_imported(
+    shop: Shop, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("app.db.engine.LIMITS", LIMITS.replace("lock_timeout=10s", "lock_timeout=60s"))
     path = table(tmp_path / "long.csv", [39.992 + at % 9 / 1000 for at in range(5_000)], begin="2020-01-01T00:00:00Z")
     dsn, staged = shop.server.database.dsn, 0
 
@@ -289,8 +297,9 @@ def test_the_machine_goes_on_while_its_past_is_imported(shop: Shop, tmp_path: Pa
         if staged % 100 == 0:
             shop.read(0.0, key=f"live-{staged}")
 
+    database = Database(dsn, pool_size=1)
     importing = threading.Thread(
-        target=run, args=(shop.server.database, path, shop.characteristic), kwargs={"progress": live_at_every_hundredth}
+        target=run, args=(database, path, shop.characteristic), kwargs={"progress": live_at_every_hundredth}
     )
     with psycopg.connect(dsn) as holding:
         holding.execute("LOCK TABLE audit_entry IN EXCLUSIVE MODE")  # the last that an import writes, under the lock
@@ -299,12 +308,11 @@ def test_the_machine_goes_on_while_its_past_is_imported(shop: Shop, tmp_path: Pa
         assert len(history(dsn, shop.characteristic)) == 50, "every line was judged, and no machine waited"
         with ThreadPoolExecutor(1) as pool:
             held_up = pool.submit(push_live, shop)
-            until(
-                lambda: rows(dsn, "SELECT 1 FROM pg_locks WHERE relation = 'machine_state'::regclass AND NOT granted")
-            )
+            until(lambda: rows(dsn, HELD_UP))
             holding.rollback()
             answer = held_up.result()
     importing.join()
+    database.close()
     assert (answer.status_code, answer.json()["sequence"]) == (201, 5_051), answer.text
     sequences = [reading["sequence"] for reading in history(dsn, shop.characteristic)]
     assert sequences == list(range(1, 5_052))
