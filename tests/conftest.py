@@ -542,7 +542,7 @@ def browser(playwright: Playwright) -> Iterator[Browser]:
         ),
         None,
     )
-    running = playwright.chromium.launch(executable_path=found, args=BROWSER_OPTIONS)
+    running = playwright.chromium.launch(executable_path=found, args=BROWSER_OPTIONS, timeout=180_000)
     yield running
     running.close()
 

@@ -24,7 +24,7 @@ from signal import SIGKILL, SIGQUIT, SIGTERM
 from tests import keeper
 
 keeper.IN_ORDER, keeper.BY_ITSELF = 3.0, 0.5
-keeper.WAYS = ((SIGTERM, 0.5), (SIGQUIT, 0.5), (SIGKILL, 3.0))
+keeper.WAYS = ((SIGTERM, 0.5), (SIGQUIT, 0.5), (SIGKILL, 30.0))
 """
 CASES = """
 import os, signal, subprocess, sys, time

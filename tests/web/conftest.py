@@ -56,7 +56,7 @@ def show(served_show: Show) -> Show:
 
 @pytest.fixture
 def client(show: Show) -> Iterator[httpx.Client]:
-    with httpx.Client(base_url=show.url, verify=TLS) as made:
+    with httpx.Client(base_url=show.url, timeout=60, verify=TLS) as made:
         yield made
 
 
@@ -83,6 +83,7 @@ def open_page(browser: Browser, show: Show) -> OpenPage:
         context.add_init_script(
             "document.addEventListener('securitypolicyviolation', (e) => console.error('policy: ' + e.violatedDirective))"
         )
+        context.set_default_timeout(60_000)
         page = context.new_page()
         page.on("console", lambda m: complaints.append(m.text) if m.type in {"error", "warning"} else None)
         page.on("pageerror", lambda error: complaints.append(str(error)))

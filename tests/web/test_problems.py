@@ -86,7 +86,7 @@ class TestQueries:
         assert shop.admin.get(f"{corrections}?state=pending&status=held").status_code == 200
 
     def test_without_credentials_nobody_learns_of_parameters(self, shop: Shop) -> None:
-        with httpx.Client(base_url=shop.admin.base_url) as nobody:
+        with httpx.Client(base_url=shop.admin.base_url, timeout=60) as nobody:
             refused(nobody.get("/api/v1/readings?limitt=1"), 401)
 
 

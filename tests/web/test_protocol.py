@@ -108,7 +108,7 @@ def test_a_head_without_end_is_refused(port: int, pieces: int) -> None:
 
 def test_a_head_of_the_usual_size_is_served(port: int) -> None:
     long = {"Long": "a" * (MOST_HEAD // 2)}
-    answer = httpx.post(f"http://127.0.0.1:{port}/", headers=long, content=b"x" * 300_000, verify=TLS)
+    answer = httpx.post(f"http://127.0.0.1:{port}/", headers=long, content=b"x" * 300_000, timeout=60, verify=TLS)
     assert answer.text == "300000"
 
 
@@ -169,7 +169,7 @@ class TestMoreConnectionsThanFiles:
     def test_the_silent_make_room(self, port: int) -> None:
         with ExitStack() as end:
             silent = [end.enter_context(connected(port)) for _ in range(6)]
-            assert httpx.get(f"http://127.0.0.1:{port}/", verify=TLS).text == "0"
+            assert httpx.get(f"http://127.0.0.1:{port}/", timeout=60, verify=TLS).text == "0"
             # Of those that came within one round of the server's loop, none has been silent longer than another.
             until(lambda: len(select(silent, [], [], 0)[0]) >= 4)
             assert [heard(client) for client in select(silent, [], [], 0)[0]] == [b""] * 4
@@ -180,7 +180,7 @@ class TestMoreConnectionsThanFiles:
         for client in busy:
             client.sendall(b"GET /held HTTP/1.1\r\nHost: x\r\nConnection: close\r\n\r\n")
         until(lambda: held.count == before + len(busy))
-        refused = httpx.get(f"http://127.0.0.1:{port}/", verify=TLS)
+        refused = httpx.get(f"http://127.0.0.1:{port}/", timeout=60, verify=TLS)
         assert (refused.status_code, refused.headers["retry-after"]) == (503, "5")
         held.answered.set()
         for client in busy:

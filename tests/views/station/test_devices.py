@@ -142,14 +142,17 @@ class TestWhatItMay:
         assert f"bound to machine {tablet.shop.machine}" in refused.text
         token = {COOKIE: tablet.browser.cookies[COOKIE]}
         for path in ("/", "/alarms", "/setup/stations", "/account", f"/machines/{tablet.shop.machine}/tools"):
-            answer = httpx.get(server.url + path, cookies=token, headers={"Accept": "text/html"}, verify=TLS)
+            answer = httpx.get(
+                server.url + path, cookies=token, headers={"Accept": "text/html"}, timeout=60, verify=TLS
+            )
             assert answer.status_code in {303, 401}, path
         for path in ("/api/v1/machines", "/api/v1/alarms", "/api/v1/events", "/api/v1/people/me"):
-            assert httpx.get(server.url + path, cookies=token, verify=TLS).status_code == 401, path
+            assert httpx.get(server.url + path, cookies=token, timeout=60, verify=TLS).status_code == 401, path
         pushed = httpx.post(
             f"{server.url}/api/v1/readings",
             cookies=token,
             json={"characteristic": tablet.shop.characteristic, "measured": 40.0},
+            timeout=60,
             verify=TLS,
         )
         assert pushed.status_code == 401
@@ -307,6 +310,7 @@ class TestSecrets:
 @pytest.fixture
 def kiosk(browser: Browser, server: Server) -> Iterator[Any]:
     context = browser.new_context(base_url=server.url, viewport={"width": 800, "height": 1280}, has_touch=True)
+    context.set_default_timeout(60_000)
     yield context.new_page()
     context.close()
 
