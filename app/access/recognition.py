@@ -97,6 +97,7 @@ async def browser_of(request: Request) -> SignedIn | None:
         return None
     lookups: Lookups = request.app.state.lookups
     waiting = request.app.state.waiting
+    request.state.newest_event = request.app.state.live.newest  # all that a page shows is read after this one
     browser = await lookups.ask(lambda session: signed_in(session, token, waiting))
     if browser is not None:
         request.state.waiting = browser.waiting
@@ -109,6 +110,7 @@ async def device_at(request: Request) -> Device | None:
     if token is None:
         return None
     if not hasattr(request.state, "device"):
+        request.state.newest_event = request.app.state.live.newest
         lookups: Lookups = request.app.state.lookups
         request.state.device = await lookups.ask(lambda session: device_of(session, token))
     return cast("Device | None", request.state.device)

@@ -66,6 +66,11 @@ class Live:
         self._tasks: list[asyncio.Task[None]] = []
         self.closing = asyncio.Event()
 
+    @property
+    def newest(self) -> int | None:
+        """The number of an event that was passed on; what is read from now on knows of it. None as long as none is known."""
+        return self._last
+
     def start(self) -> None:
         """Begin to listen; call it on the loop that serves requests."""
         loop = asyncio.get_running_loop()
@@ -196,7 +201,7 @@ class Live:
             known = self._last if after is None else after
             yield _frame("hello", {}, known)
             sent = 0 if known is None else known
-            if after is not None:
+            if after is not None and after != self._last:
                 for message in await self._missed(after):
                     sent = message.number
                     if message.machine in {None, machine} or machine is None:

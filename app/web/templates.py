@@ -116,6 +116,7 @@ def render(request: Request, template: str | Template, **context: Any) -> str:
                     "chosen_theme": chosen_theme(request),
                     "person": getattr(state, "person", None),
                     "csrf": getattr(state, "csrf", ""),
+                    "newest_event": getattr(state, "newest_event", None),
                     "to_do": None,
                     "chosen_machine": None,
                     "plant": _plant(request),

@@ -47,7 +47,7 @@ def drawn(page: Page, charts: str = "plotly-chart") -> None:
 
 
 def live(page: Page) -> None:
-    """Wait until the page is told what happens. What happened while it was on its way it may never hear."""
+    """Wait until the page hears what happens."""
     expect(page.locator("live-status")).to_have_attribute("state", "live")
 
 

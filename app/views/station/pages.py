@@ -38,6 +38,7 @@ from app.views.characteristic.wording import state_word
 from app.views.station import queries
 from app.views.station.wording import next_action
 from app.web.deps import SESSION_COOKIE, STATION_COOKIE, FormDep, Number, SessionDep, SettingsDep, Word, from_this_site
+from app.web.fields import LARGEST_ID
 from app.web.forms import by_field
 from app.web.limits import FEW, takes
 from app.web.live import Access, stream
@@ -368,12 +369,13 @@ def events(
     at: Station,
     machine: str,
     last_event_id: Annotated[str | None, Header()] = None,
+    after: Annotated[int | None, Query(ge=0, le=LARGEST_ID)] = None,
 ) -> Response:
     """The live events of this machine, for its station."""
     cookie = STATION_COOKIE if at.device else SESSION_COOKIE
     token, role = request.cookies.get(cookie), at.caller.role if at.caller else None
     granted = Access(digest(token) if token else None, at.caller.key_id if at.caller else None, role)
-    return stream(request, granted, machine_named(session, machine).key, last_event_id)
+    return stream(request, granted, machine_named(session, machine).key, last_event_id, after)
 
 
 def _of_machine(session: Session, machine: str, number: int) -> AlarmRow:

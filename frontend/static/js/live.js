@@ -30,7 +30,8 @@ let heard = performance.now();
 let hasHeartbeat = false;
 let wasLost = false;
 let retry = 0;
-let newest = ""; // number of the last event
+// Number of the last event: at first of one that the page was made after, so that what happened since then arrives as well.
+let newest = document.querySelector("meta[name=event]")?.content ?? "";
 
 function hear() {
   heard = performance.now();
@@ -77,7 +78,7 @@ function deliver(kind, message) {
 function connect() {
   clearTimeout(retry);
   source?.close();
-  source = new EventSource(URL_OF_EVENTS);
+  source = new EventSource(newest ? `${URL_OF_EVENTS}?after=${newest}` : URL_OF_EVENTS);
   source.onopen = hear;
   // Who greets sends heartbeats too. On a busy plant none may ever come: events take their place.
   for (const sign of ["hello", "heartbeat"]) {

@@ -1,9 +1,10 @@
 """The plant's page: empty, full, live, and never a stale green."""
 
+import re
 from typing import Any
 
 import pytest
-from playwright.sync_api import Page, expect
+from playwright.sync_api import Page, Route, expect
 from sqlalchemy import event
 
 from app.core.state import CharacteristicState
@@ -11,6 +12,7 @@ from app.views.characteristic import state_queries as queries
 from tests.conftest import RunServer, Server
 from tests.pages.looks import live
 from tests.shop import PARAMETERS, Person, Shop
+from tests.waits import until
 
 pytestmark = pytest.mark.own_server
 
@@ -32,6 +34,13 @@ def touched(page: Page, selector: str) -> None:
         }""",
         selector,
     )
+
+
+def newest_event(person: Person) -> int:
+    """The number of the event that a page is made after."""
+    found = re.search(r'<meta name="event" content="(\d+)">', person.open("/account"))
+    assert found is not None
+    return int(found[1])
 
 
 class TestWithoutScripts:
@@ -135,6 +144,26 @@ class TestLive:
         expect(line(page, shop)).to_contain_text("1 alarm")
         expect(page.locator(".plant-count strong").first).to_have_text(str(needed + 1))
         assert page.evaluate("window.untouched")
+
+    def test_what_happens_before_the_page_is_told_anything_is_shown(
+        self, shop: Shop, viewer: Person, page: Page
+    ) -> None:
+        held: list[Route] = []
+
+        def hold(route: Route) -> None:
+            held.append(route)
+
+        viewer.sign_in(page)
+        page.route("**/api/v1/events*", hold)
+        page.goto("/")
+        expect(line(page, shop)).to_contain_text("No readings yet")
+        before = newest_event(viewer)
+        shop.read(12.0)
+        until(lambda: newest_event(viewer) > before)  # everybody who listens has heard of it
+        while not held:
+            page.wait_for_timeout(20)
+        held[0].continue_()
+        expect(line(page, shop)).to_contain_text("Oversize")
 
     def test_a_new_characteristic_appears(self, shop: Shop, viewer: Person, page: Page) -> None:
         viewer.sign_in(page)
