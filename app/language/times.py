@@ -93,12 +93,30 @@ def begin_of_shift(at: datetime) -> datetime:
     return next(begin for begin in begins if begin <= there)
 
 
-def begins_of_shifts(first: datetime, last: datetime) -> list[datetime]:
-    """Beginnings of the shifts from the one in which the first moment lies to that of the last, ascending."""
-    begin, end = begin_of_shift(first), local(last)
-    days = (begin.date() + timedelta(day) for day in range((end.date() - begin.date()).days + 1))
-    begins = (datetime.combine(day, at, plant_zone()) for day in days for at in _time().shifts)
-    return [each for each in begins if begin <= each <= end]
+def shifts_now() -> str:
+    """When the shifts of the plant begin, and by the clock of which zone, to be kept with what was grouped by them."""
+    plant = _time()
+    return f"{','.join(f'{begin:%H:%M}' for begin in plant.shifts)} {plant.zone.key}"
+
+
+def begins_of_shifts(first: datetime, last: datetime, kept: str | None = None) -> list[datetime]:
+    """Beginnings of the shifts from the one in which the first moment lies to that of the last, ascending.
+
+    kept: shifts as `shifts_now` wrote them; without them those of the plant as they are set now.
+
+    >>> from datetime import UTC
+    >>> noon, evening = (datetime(2026, 10, 25, hour, tzinfo=UTC) for hour in (12, 20))
+    >>> [str(each) for each in begins_of_shifts(noon, evening, "06:00,18:00 Europe/Berlin")]
+    ['2026-10-25 06:00:00+01:00', '2026-10-25 18:00:00+01:00']
+    """
+    clocks, name = (kept or shifts_now()).rsplit(" ", 1)
+    zone, shifts = ZoneInfo(name), [time.fromisoformat(each) for each in clocks.split(",")]
+    day, end = first.astimezone(zone).date() - timedelta(1), last.astimezone(zone).date()
+    days = (day + timedelta(n) for n in range((end - day).days + 1))
+    begins = [datetime.combine(day, at, zone) for day in days for at in shifts]
+    return [
+        each for each, next_one in zip(begins, [*begins[1:], last], strict=True) if each <= last and next_one > first
+    ]
 
 
 def is_twice(at: datetime) -> bool:

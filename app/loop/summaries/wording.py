@@ -126,7 +126,7 @@ def estimator(how: Estimator) -> str:
         Estimator.STANDARD_DEVIATIONS: _("subgroup standard deviations / c4"),
         Estimator.POOLED: _("pooled variance inside subgroups"),
         Estimator.OVERALL: _("standard deviation of all readings"),
-        Estimator.GIVEN: _("given"),
+        Estimator.GIVEN: _("given by the customer"),
     }[how]
 
 

@@ -12,6 +12,7 @@ from app.loop.characteristics.queries import CurrentCharacteristic
 from app.loop.tables.characteristics import Characteristic
 from app.quality.control_charts import queries, wording
 from app.quality.control_charts.drafts import draft_of
+from app.quality.control_charts.given_limits import limits_of
 from app.quality.control_charts.schemas import BaselineIn, PeriodIn
 from app.quality.control_charts.tables import Baseline
 from app.web.created import Created
@@ -46,9 +47,11 @@ def freeze(session: Session, current: CurrentCharacteristic, given: BaselineIn, 
 
 
 def _sent_before(before: Baseline, given: BaselineIn) -> Created[Baseline]:
-    same = all(
+    limits = limits_of(given)
+    frozen = (before.centre, before.sigma) if before.given else None
+    same = frozen == (limits and (limits.centre, limits.sigma.value)) and all(
         getattr(before, name) == value
-        for name, value in given.model_dump(mode="json", include=set(PeriodIn.model_fields)).items()
+        for name, value in given.model_dump(mode="json", include=set(PeriodIn.model_fields) - {"limits"}).items()
         if not (name == "settle" and value is None)  # what was left out was found in the readings
     )
     if not same:

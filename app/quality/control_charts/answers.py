@@ -5,7 +5,6 @@ from typing import Any
 import numpy as np
 
 from app.core.spc.refusal import Floats
-from app.core.spc.shewhart import ENOUGH_READINGS
 from app.quality.control_charts import rules_wording
 from app.quality.control_charts.drafts import Draft
 from app.quality.control_charts.schemas import (
@@ -34,7 +33,8 @@ def _numbers(baseline: Baseline, key: str) -> dict[str, Any]:
         "characteristic": key,
         "lower": baseline.centre - 3 * baseline.sigma,
         "upper": baseline.centre + 3 * baseline.sigma,
-        "provisional": baseline.readings < ENOUGH_READINGS,
+        "provisional": baseline.provisional,
+        "degrees_of_freedom": None if baseline.given else baseline.freedom,
     }
 
 

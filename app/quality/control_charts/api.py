@@ -20,6 +20,7 @@ from app.quality.control_charts.drafts import draft_of
 from app.quality.control_charts.editor import PICKED, EditorChoice, picture_of
 from app.quality.control_charts.figures import control_figure
 from app.quality.control_charts.schemas import (
+    LARGEST_LIMIT,
     BaselineIn,
     BaselineOut,
     BaselineWhyIn,
@@ -47,6 +48,12 @@ Judge = Annotated[
 ]
 Kind = Annotated[
     Chart | None, Query(description="Which chart; individuals or X-bar, whichever the baseline is for, if left out.")
+]
+GivenLimit = Annotated[
+    float | None,
+    Query(
+        ge=-LARGEST_LIMIT, le=LARGEST_LIMIT, description="Limits given by the customer, mm: see `limits` of a baseline."
+    ),
 ]
 
 
@@ -228,14 +235,29 @@ def get_baseline_editor(
     excluded: Annotated[
         str, Query(pattern=PICKED, max_length=4000, description="Runs of readings that are left out: 640-641,702-702.")
     ] = "",
+    centre: GivenLimit = None,
+    sigma: GivenLimit = None,
+    lower: GivenLimit = None,
+    upper: GivenLimit = None,
     theme: Theme = "light",
     width: Width = 1240,
 ) -> Response:
     """The chart on which a period is chosen: the readings, the period, and the limits that it would give."""
     current = characteristics.characteristic_for(session, caller, characteristic, "viewer")
     window = statistics.window_of(session, current.characteristic, **choice._asdict())
+    given = {"centre": centre, "sigma": sigma, "lower": lower, "upper": upper}
     picked = EditorChoice(
-        quantity, chart, grouping, group_size, group_pause, pooled, settle, first_sequence, last_sequence, excluded
+        quantity,
+        chart,
+        grouping,
+        group_size,
+        group_pause,
+        pooled,
+        settle,
+        first_sequence,
+        last_sequence,
+        excluded,
+        {name: value for name, value in given.items() if value is not None},
     )
     view, marked = picture_of(session, current, picked, window)
     return chart_answer(control_figure(view, key=characteristic, marked=marked, width=width, picks=True), theme)

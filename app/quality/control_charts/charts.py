@@ -68,7 +68,8 @@ def view(
             errors=[FieldError("chart", wrong)],
         )
     view = _drawn(session, current, baseline, window, kind, watched)
-    view = replace(view, left_out=view.left_out and view.left_out.within(window.first, window.last))
+    left_out = view.left_out and view.left_out.within(window.first, window.last)
+    view = replace(view, left_out=left_out, given=baseline.given)
     if not window.timed:
         return view
     # What a point is does not depend on the period; whether it is shown does.

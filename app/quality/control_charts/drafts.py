@@ -12,11 +12,13 @@ from app.core.spc.refusal import Floats, Reason, Refused
 from app.core.spc.spread import Estimator, Subgroups, summary
 from app.errors import FieldError, Invalid
 from app.language.i18n import _
+from app.language.times import shifts_now
 from app.loop.characteristics.queries import CurrentCharacteristic
 from app.loop.summaries import queries as statistics
 from app.loop.summaries.queries import Window
 from app.loop.summaries.wording import refusal
 from app.quality.control_charts import queries, wording
+from app.quality.control_charts.given_limits import against, limits_of, refused
 from app.quality.control_charts.schemas import PeriodIn
 from app.quality.control_charts.series_queries import LeftOut, ReadingSeries, read
 from app.quality.control_charts.tables import Baseline
@@ -69,14 +71,16 @@ def draft_of(session: Session, current: CurrentCharacteristic, given: PeriodIn) 
     newest = statistics.window_of(session, current.characteristic).newest
     _check(given, newest)
     baseline = _plan(current, given)
+    limits = limits_of(given)
     window = Window(given.first_sequence, given.last_sequence, newest)
     readings = read(session, current, baseline, window)
     try:
-        line = _line(readings.series)
-        if baseline.quantity == Quantity.WEAR_RESIDUALS:
+        rests = limits is None or given.quantity is Quantity.WEAR_RESIDUALS  # on the readings of the period
+        line = _line(readings.series) if rests or len(readings.series) >= shewhart.FEWEST_READINGS else None
+        if line is not None and baseline.quantity == Quantity.WEAR_RESIDUALS:
             baseline.slope, baseline.slope_error = line.slope, line.error
             baseline.settle = given.settle or _run_in(session, current, baseline, readings, window)
-        _take(baseline, _estimated(session, current, baseline, readings, window))
+        _take(baseline, limits or _estimated(session, current, baseline, readings, window))
     except Refused as refused:
         wrong = refusal(refused)
         raise Invalid(
@@ -114,6 +118,7 @@ def _check(given: PeriodIn, newest: int) -> None:
         errors.append(FieldError("group_size", _("how many readings make a subgroup?")))
     elif given.grouping == "pause" and given.group_pause is None:
         errors.append(FieldError("group_pause", _("how long a pause ends a subgroup?")))
+    errors += against(given)
     if given.cusum_headstart >= given.cusum_h:
         errors.append(FieldError("cusum_headstart", _("must be below h")))
     errors += [
@@ -134,20 +139,15 @@ def _check(given: PeriodIn, newest: int) -> None:
         and (run.last < given.first_sequence or run.first > given.last_sequence)
     ]
     if errors:
-        raise Invalid(
-            _("This period cannot be made a baseline: {field}: {message}.").format(
-                field=errors[0].field, message=errors[0].message
-            ),
-            _("Correct the named fields and send it again."),
-            errors=errors,
-        )
+        raise refused(errors)
 
 
 def _plan(current: CurrentCharacteristic, given: PeriodIn) -> Baseline:
-    settings = given.model_dump(include=set(PeriodIn.model_fields) - {"excluded", "quantity", "pooled"})
+    settings = given.model_dump(include=set(PeriodIn.model_fields) - {"excluded", "quantity", "pooled", "limits"})
     return Baseline(
         **settings,
         quantity=given.quantity.value,
+        shifts=shifts_now() if given.grouping == "shift" else None,
         excluded=[run.model_dump() for run in given.excluded],
         factor=current.parameters.factor,
         parameters_version=current.version.version,
@@ -213,7 +213,7 @@ def _cautions(
     current: CurrentCharacteristic,
     baseline: Baseline,
     series: ReadingSeries,
-    line: WearLine,
+    line: WearLine | None,
     window: Window,
 ) -> list[tuple[Caution, int]]:
     """Cautions against freezing it; its own signals and normality are noted in the baseline."""
@@ -222,7 +222,7 @@ def _cautions(
     baseline.signals = _signals(baseline, points)
     baseline.normal_p = _normal_p(values)
     cautions: list[tuple[Caution, int]] = []
-    if baseline.readings < shewhart.ENOUGH_READINGS:
+    if baseline.provisional:
         cautions.append((Caution.PROVISIONAL, baseline.readings))
     if baseline.signals:
         cautions.append((Caution.SIGNALS, baseline.signals))
@@ -230,7 +230,7 @@ def _cautions(
         cautions.append((Caution.NOT_NORMAL, 0))
     correlation = summary(values).autocorrelation if len(values) > 1 else None
     which = Quantity(baseline.quantity)
-    wears = abs(line.slope) > WEARS * line.error and which is Quantity.WITHOUT_CORRECTIONS
+    wears = which is Quantity.WITHOUT_CORRECTIONS and line is not None and abs(line.slope) > WEARS * line.error
     if wears:
         cautions.append((Caution.WEARS, 0))
     elif correlation is not None and correlation > CORRELATED:

@@ -1,5 +1,7 @@
 """The picture on which a baseline is chosen: readings, the period, and its limits as soon as it has any. Never writes."""
 
+from collections.abc import Mapping
+from types import MappingProxyType
 from typing import NamedTuple
 
 from sqlalchemy.orm import Session
@@ -35,6 +37,7 @@ class EditorChoice(NamedTuple):
     first: int | None = None
     last: int | None = None
     excluded: str = ""
+    limits: Mapping[str, float] = MappingProxyType({})
 
     @property
     def runs(self) -> list[tuple[int, int]]:
@@ -58,6 +61,7 @@ class EditorChoice(NamedTuple):
                 "settle": self.settle,
                 "first_sequence": self.first,
                 "last_sequence": self.last,
+                "limits": dict(self.limits) or None,
                 "excluded": [ExcludedIn(first=low, last=high, reason="–").model_dump() for low, high in self.runs],
             },
         )

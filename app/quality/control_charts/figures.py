@@ -141,8 +141,9 @@ def _limits(view: View, drawn: NDArray[np.int64]) -> list[Series]:
 
 def _names(view: View, width: int, span: float) -> list[Note]:
     """The limits by name, at the right of the newest point."""
+    notes = [_given()] if view.given and view.centre is not None else []
     if width < 600 or view.centre is None:
-        return []
+        return notes
     decimals = 2 if span < 20 else 1
     names = [(_("centre"), view.centre), (_("lower"), view.lower), (_("upper"), view.upper)]
     newest = {
@@ -155,7 +156,12 @@ def _names(view: View, width: int, span: float) -> list[Note]:
         labels = [(_("{low} to {high}").format(low=low, high=high), float(np.mean(list(newest.values()))))]
     else:
         labels = [(f"{name} {_value(view, value, decimals)}", value) for name, value in newest.items()]
-    return [Note(text, Share(1), value, "left", shift=(6, 0)) for text, value in labels]
+    return notes + [Note(text, Share(1), value, "left", shift=(6, 0)) for text, value in labels]
+
+
+def _given() -> Note:
+    text = _("limits given by the customer")
+    return Note(text, Share(0, inside=True), Share(0, inside=True), "left", "bottom", shift=(6, 4), ground=True)
 
 
 def _value(view: View, value: float, decimals: int) -> str:

@@ -12,7 +12,19 @@ from app.web.forms import by_field, length, whole
 
 WHOLE = ("first_sequence", "last_sequence", "group_size", "settle", "average_span")
 NUMBERS = ("group_pause", "ewma_lambda", "ewma_width", "cusum_k", "cusum_h", "cusum_headstart")
-FIELDS = ("chart", "quantity", "grouping", "pooled", "ewma_exact", *WHOLE, *NUMBERS, "excluded")
+LIMITS = ("centre", "sigma", "lower", "upper")
+"""Limits that the customer gives; in the form their names begin with `limits.`."""
+FIELDS = (
+    "chart",
+    "quantity",
+    "grouping",
+    "pooled",
+    "ewma_exact",
+    *WHOLE,
+    *NUMBERS,
+    "excluded",
+    *(f"limits.{name}" for name in LIMITS),
+)
 _RUN = re.compile(r"(\d{1,15})(?:\s*[-\N{EN DASH}\N{HYPHEN}]\s*(\d{1,15}))?(?:[\s,;:]+(\S.*))?")
 
 
@@ -32,7 +44,9 @@ def period(form: Mapping[str, str]) -> dict[str, Any]:
         fields["group_pause"] = None
     if form.get("quantity") != Quantity.WEAR_RESIDUALS:
         fields["settle"] = None
-    return fields | {"excluded": runs(form.get("excluded", ""))}
+    limits = {name: length(form.get(f"limits.{name}")) for name in LIMITS}
+    said = {name: value for name, value in limits.items() if value is not None}
+    return fields | {"excluded": runs(form.get("excluded", "")), "limits": said or None}
 
 
 def runs(text: str) -> list[dict[str, Any]]:

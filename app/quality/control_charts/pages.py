@@ -256,6 +256,7 @@ def _freeze(
         suits=suits,
         typed=typed,
         fields=form_reader.FIELDS,
+        limits_said=any(name.startswith("limits.") and text for name, text in typed.items()),
         errors=form_reader.at_fields(error) if error else {},
         problem=error,
         quantities=list(Quantity),
@@ -280,6 +281,7 @@ def _pictured(typed: Mapping[str, str], choice: Choice) -> dict[str, Any]:
     values = (
         {name: getattr(period, name) for name in names}
         | pooled
+        | ({} if period.limits is None else period.limits.model_dump())
         | {
             "quantity": period.quantity.value,
             "excluded": ",".join(f"{run.first}-{run.last}" for run in period.excluded),

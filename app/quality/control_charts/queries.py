@@ -90,7 +90,7 @@ def rules_of(baseline: Baseline) -> tuple[RuleName, ...]:
 def judged_by(baseline: Baseline, width: float = 3.0) -> shewhart.Baseline:
     """The baseline as the core knows it: centre and sigma of a single value."""
     sigma = Sigma(baseline.sigma, Estimator(baseline.estimator), baseline.readings, baseline.groups, baseline.freedom)
-    return shewhart.Baseline(baseline.centre, sigma, width, provisional=baseline.readings < shewhart.ENOUGH_READINGS)
+    return shewhart.Baseline(baseline.centre, sigma, width, provisional=baseline.provisional)
 
 
 @dataclass(frozen=True, slots=True)

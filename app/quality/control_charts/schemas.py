@@ -10,6 +10,8 @@ from app.web.fields import LARGEST_ID, LARGEST_SERIAL, Body, Reason
 
 ChartName = Literal["individuals", "xbar_r", "xbar_s"]
 Grouping = Literal["consecutive", "pause", "part", "shift", "nest"]
+LARGEST_LIMIT = 1000.0
+Limit = Annotated[float, Field(strict=True, ge=-LARGEST_LIMIT, le=LARGEST_LIMIT)]
 Place = Annotated[int, Field(strict=True, ge=1, le=LARGEST_ID)]
 MOST_EXCLUDED = 100
 
@@ -20,6 +22,23 @@ class ExcludedIn(Body):
     first: Place
     last: Place
     reason: Reason
+
+
+class LimitsIn(Body):
+    """Limits that are given, by a customer or a standard, and not estimated: centre and sigma, or lower and upper. mm."""
+
+    model_config = ConfigDict(extra="forbid", allow_inf_nan=False)
+
+    centre: Limit | None = Field(None, description="Of what is charted: a deviation from the target, not a size.")
+    sigma: Annotated[float, Field(strict=True, gt=0, le=LARGEST_LIMIT)] | None = Field(
+        None, description="Of a single value, also for charts of subgroups."
+    )
+    lower: Limit | None = Field(
+        None,
+        description="Limits at 3 sigma, as they are drawn on the individuals or X̄ chart. For subgroups only `consecutive`: "
+        "those of one size have one limit. With a `centre` it lies in the middle.",
+    )
+    upper: Limit | None = None
 
 
 class PeriodIn(Body):
@@ -34,7 +53,7 @@ class PeriodIn(Body):
     grouping: Grouping | None = Field(
         None,
         description="For subgroups: so many readings one after the other, a pause that ends one, or neighbours of the same part, "
-        "shift (as the plant's shifts are set) or nest (spindle, cavity: the `nest` of their context).",
+        "shift (as the plant's shifts are set now; the baseline keeps them) or nest (spindle, cavity: the `nest` of their context).",
     )
     pooled: bool = Field(
         False,
@@ -68,6 +87,11 @@ class PeriodIn(Body):
     )
     average_span: int = Field(5, strict=True, ge=2, le=1000, description="Readings in a moving average.")
     excluded: list[ExcludedIn] = Field([], max_length=MOST_EXCLUDED, description="Left out, each run with a reason.")
+    limits: LimitsIn | None = Field(
+        None,
+        description="Limits given by the customer. Nothing is estimated then: one reading makes a period, which says from "
+        "where on readings are judged. `wear_residuals` still takes its slope from the period.",
+    )
 
 
 class BaselineIn(PeriodIn):
@@ -119,6 +143,10 @@ class DraftOut(Body):
     grouping: Grouping | None
     group_size: int | None
     group_pause: float | None
+    shifts: str | None = Field(
+        description="For `shift`: when shifts began, and by the clock of which zone, as it was frozen. Null in baselines "
+        "frozen before 26 November 2026: they follow the plant's setting of today."
+    )
     ewma_lambda: float
     ewma_width: float
     ewma_exact: bool
@@ -130,11 +158,11 @@ class DraftOut(Body):
     sigma: float = Field(description="Of a single value.")
     lower: float = Field(description="Centre - 3 sigma: limits of single values; of subgroups the chart says its own.")
     upper: float
-    estimator: str = Field(description="How sigma was come by.")
-    degrees_of_freedom: float = Field(description="What sigma is worth.")
-    readings: int = Field(description="That sigma was made of.")
+    estimator: str = Field(description="How sigma was come by; `given`: with the limits, by the customer.")
+    degrees_of_freedom: float | None = Field(description="What sigma is worth; null where the limits were given.")
+    readings: int = Field(description="That sigma was made of; 0 where the limits were given.")
     groups: int = Field(description="Ranges or subgroups that sigma was made of.")
-    provisional: bool = Field(description="Fewer than 100 readings.")
+    provisional: bool = Field(description="Estimated from fewer than 100 readings.")
     factor: float = Field(description="What the corrections were taken out with: mm of offset per mm of size error.")
     wear_per_reading: float | None = Field(description="For wear_residuals: the slope of the wear line, frozen.")
     wear_error: float | None = Field(description="Its standard error.")

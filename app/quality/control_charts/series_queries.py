@@ -36,6 +36,7 @@ class Plan(Protocol):
     grouping: str | None
     group_size: int | None
     group_pause: float | None
+    shifts: str | None
     first_sequence: int
     last_sequence: int
     excluded: list[Any]
@@ -104,7 +105,7 @@ def read(session: Session, current: CurrentCharacteristic, plan: Plan, window: W
     begins = _begins(session, current, history["received_at"], history["measured"] - history["deviation"])
     labels = np.zeros_like(sequence)
     if plan.grouping == "shift":
-        labels = _shifts(history["measured_at"])
+        labels = _shifts(history["measured_at"], plan.shifts)
     elif plan.grouping in ("part", "nest"):
         labels = _labels(session, current, window, sequence, plan.grouping)
     left_out = LeftOut(sequence[history.excluded], sequence[by_plan], sequence[faults], sequence[unknown])
@@ -145,14 +146,14 @@ def _naive(moment: datetime) -> np.datetime64:
     return np.datetime64(moment.replace(tzinfo=None), "us")
 
 
-def _shifts(measured_at: Moments) -> Whole:
-    """Shifts of the plant in which these moments lie, as numbers from 1 that grow with time."""
+def _shifts(measured_at: Moments, kept: str | None) -> Whole:
+    """Shifts in which these moments lie, as the baseline kept them (of old: the plant's), as numbers from 1 that grow."""
     if not len(measured_at):
         return np.zeros(0, np.int64)
     ends = (
         moment.astype("datetime64[us]").item().replace(tzinfo=UTC) for moment in (measured_at.min(), measured_at.max())
     )
-    begins = [_naive(begin.astimezone(UTC)) for begin in begins_of_shifts(*ends)]
+    begins = [_naive(begin.astimezone(UTC)) for begin in begins_of_shifts(*ends, kept)]
     return np.searchsorted(np.array(begins), measured_at, side="right").astype(np.int64)
 
 

@@ -6,6 +6,7 @@ from typing import Any
 from sqlalchemy import BigInteger, CheckConstraint, ForeignKeyConstraint, Index, func, text
 from sqlalchemy.orm import Mapped, mapped_column
 
+from app.core.spc.shewhart import ENOUGH_READINGS
 from app.core.spc.spread import Estimator
 from app.db.base import Base
 
@@ -44,6 +45,7 @@ class Baseline(Base):
     grouping: Mapped[str | None]  # consecutive, pause, part, shift or nest; None for individuals
     group_size: Mapped[int | None]  # consecutive: readings in a subgroup
     group_pause: Mapped[float | None]  # pause: minutes without a reading that end a subgroup
+    shifts: Mapped[str | None]  # shift: `06:00,14:00,22:00 Europe/Berlin`; None in old ones: the plant's of today
     ewma_lambda: Mapped[float]
     ewma_width: Mapped[float]  # L
     ewma_exact: Mapped[bool]
@@ -57,7 +59,7 @@ class Baseline(Base):
     centre: Mapped[float]
     sigma: Mapped[float]  # of a single value of the quantity
     estimator: Mapped[str]  # app.core.spc.spread.Estimator
-    freedom: Mapped[float]  # degrees of freedom of sigma
+    freedom: Mapped[float]  # degrees of freedom of sigma; infinite where it was given
     readings: Mapped[int]  # that sigma was made of
     groups: Mapped[int]  # ranges or subgroups that sigma was made of
     factor: Mapped[float]  # mm of offset per mm of size error: what corrections were taken out with
@@ -79,3 +81,13 @@ class Baseline(Base):
     def pooled(self) -> bool:
         """Tell if sigma was made of the pooled variance inside the subgroups."""
         return self.estimator == Estimator.POOLED
+
+    @property
+    def given(self) -> bool:
+        """Tell if its limits were given by the customer, not estimated."""
+        return self.estimator == Estimator.GIVEN
+
+    @property
+    def provisional(self) -> bool:
+        """Tell if it was estimated from too few readings for firm limits."""
+        return not self.given and self.readings < ENOUGH_READINGS

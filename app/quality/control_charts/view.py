@@ -20,7 +20,7 @@ class View:
     """One chart of a window; mm. below: the lower sum of a CUSUM, whose points are the upper one.
 
     centre, lower, upper: single numbers, or one for each point; None without a baseline. begins: comes first of a tool.
-    left_out: readings of the window that count for nothing.
+    left_out: readings of the window that count for nothing. given: its limits are given by the customer.
     """
 
     kind: Chart
@@ -38,6 +38,7 @@ class View:
     waiting: int = 0
     settling: int = 0
     left_out: LeftOut | None = None
+    given: bool = False
 
     def __len__(self) -> int:
         """Number of points."""

@@ -144,7 +144,8 @@ def grouping(baseline: Baseline) -> str:
         case "part":
             return _("readings of the same part")
         case "shift":
-            return _("readings of the same shift")
+            same = _("readings of the same shift")
+            return f"{same} ({baseline.shifts})" if baseline.shifts else same
         case "nest":
             return _("neighbours of the same nest or spindle")
         case _:

@@ -9,7 +9,8 @@ import numpy as np
 from app.core.spc.quantity import Quantity
 from app.core.spc.refusal import Floats
 from app.core.spc.rules import RuleName
-from app.core.spc.shewhart import ENOUGH_READINGS, Chart
+from app.core.spc.shewhart import Chart
+from app.core.spc.spread import Estimator
 from app.files.documents.content import (
     Column,
     Fact,
@@ -24,6 +25,7 @@ from app.files.documents.content import (
     words,
 )
 from app.language.i18n import _
+from app.loop.summaries.wording import estimator
 from app.loop.timeline import queries as timeline
 from app.quality.control_charts import charts, signals_queries, wording
 from app.quality.control_charts import queries as controls
@@ -95,7 +97,7 @@ def _left_out(main: View) -> tuple[str, ...]:
 
 def _warnings(frame: Frame, baseline: Baseline) -> tuple[str, ...]:
     sentences = []
-    if baseline.readings < ENOUGH_READINGS:
+    if baseline.provisional:
         sentences.append(
             _("The baseline is provisional: it was computed from only {n} readings.").format(n=baseline.readings)
         )
@@ -111,9 +113,10 @@ def _of_baseline(baseline: Baseline) -> list[Fact]:
         Fact("baseline_period", _("Its period"), words(wording.period(baseline))),
         Fact("quantity", _("What is charted"), words(wording.quantity(Quantity(baseline.quantity)))),
         Fact("charts", _("Charts"), words(wording.baseline_chart(baseline.chart))),
-        Fact("baseline_readings", _("Readings it was made of"), count(baseline.readings)),
+        Fact("baseline_readings", _("Readings it was made of"), count(None if baseline.given else baseline.readings)),
         Fact("baseline_centre", _("Centre of single values"), deviation(baseline.centre, 3)),
         Fact("baseline_sigma", _("Sigma of a single value"), width(baseline.sigma, 3)),
+        Fact("baseline_estimator", _("Sigma from"), words(estimator(Estimator(baseline.estimator)))),
     ]
     if baseline.grouping is not None:
         facts.insert(5, Fact("grouping", _("Subgroups"), words(wording.grouping(baseline))))
