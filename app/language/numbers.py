@@ -6,6 +6,7 @@ Lengths come in mm. Deviations, limits and corrections are read in µm, sizes in
 from __future__ import annotations
 
 from datetime import UTC, datetime
+from math import isclose
 
 from babel.dates import format_datetime
 from markupsafe import Markup, escape
@@ -16,6 +17,9 @@ from app.language.times import is_twice, local, offset, plant_zone
 MINUS = "\N{MINUS SIGN}"
 PLUS_MINUS = "\N{PLUS-MINUS SIGN}"
 NO_BREAK_SPACE = "\N{NO-BREAK SPACE}"
+MOST_MORE = 7
+LEVELS = (0.005, 0.01, 0.05, 0.25)
+"""Levels of significance in use: normal or not, one in a hundred, one in twenty, an interaction that is pooled (AIAG)."""
 NOTHING = "\N{EN DASH}"
 
 
@@ -40,6 +44,33 @@ def fixed(value: float | None, decimals: int) -> str:
     if value is None:
         return NOTHING
     return f"{MINUS if round(value, decimals) < 0 else ''}{abs(value):.{decimals}f}"
+
+
+def decimals_beside(value: float, decimals: int, *limits: float) -> int:
+    """So many decimals that the rounded value lies on the same side of each limit as the value: as few as can be, seven more at most."""
+    for more in range(decimals, decimals + MOST_MORE):
+        rounded = round(value, more)
+        if all((rounded > limit) - (rounded < limit) == (value > limit) - (value < limit) for limit in limits):
+            return more
+    return decimals if any(isclose(value, limit, abs_tol=1e-9) for limit in limits) else decimals + MOST_MORE
+
+
+def beside(value: float | None, decimals: int, *limits: float) -> str:
+    """A number that is read beside limits, never rounded across one: with more decimals where it lies close to it.
+
+    >>> beside(9.96, 1, 10.0), beside(9.94, 1, 10.0), beside(1.329, 2, 1.33), beside(1.33, 2, 1.33), beside(None, 2)
+    ('9.96', '9.9', '1.329', '1.33', '–')
+    """
+    return fixed(value, decimals if value is None else decimals_beside(value, decimals, *limits))
+
+
+def probability(p: float, equal: str = "") -> str:
+    """A p-value as one reads it, never rounded across a level at which something is decided.
+
+    >>> probability(0.0004), probability(0.974), probability(0.974, "= "), probability(0.04996)
+    ('< 0.001', '0.974', '= 0.974', '0.04996')
+    """
+    return "< 0.001" if p < 0.001 else f"{equal}{beside(p, 3, *LEVELS)}"
 
 
 def short(value: float | None, digits: int = 6) -> str:

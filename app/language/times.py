@@ -108,15 +108,16 @@ def begins_of_shifts(first: datetime, last: datetime, kept: str | None = None) -
     >>> noon, evening = (datetime(2026, 10, 25, hour, tzinfo=UTC) for hour in (12, 20))
     >>> [str(each) for each in begins_of_shifts(noon, evening, "06:00,18:00 Europe/Berlin")]
     ['2026-10-25 06:00:00+01:00', '2026-10-25 18:00:00+01:00']
+    >>> len(begins_of_shifts(evening, evening, "06:00,18:00 Europe/Berlin"))
+    1
     """
     clocks, name = (kept or shifts_now()).rsplit(" ", 1)
     zone, shifts = ZoneInfo(name), [time.fromisoformat(each) for each in clocks.split(",")]
     day, end = first.astimezone(zone).date() - timedelta(1), last.astimezone(zone).date()
     days = (day + timedelta(n) for n in range((end - day).days + 1))
     begins = [datetime.combine(day, at, zone) for day in days for at in shifts]
-    return [
-        each for each, next_one in zip(begins, [*begins[1:], last], strict=True) if each <= last and next_one > first
-    ]
+    ends = [*begins[1:], last + timedelta(1)]
+    return [begin for begin, after in zip(begins, ends, strict=True) if begin <= last and first < after]
 
 
 def is_twice(at: datetime) -> bool:

@@ -18,8 +18,6 @@ from app.core.spc.spread import far_off
 
 RUN = 50
 """Parts of a run at least (ISO 22514-3, where 100 are better)."""
-ASKED_FOR = 5 / 3
-"""What is usually asked of Pmk: a machine takes five of six parts of the room that a process has at 4/3."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -13,7 +13,7 @@ from typing import Any, Literal
 from zoneinfo import ZoneInfo
 
 from app.language.i18n import _
-from app.language.numbers import MINUS, NO_BREAK_SPACE, NOTHING, in_percent, signed
+from app.language.numbers import LEVELS, MINUS, NO_BREAK_SPACE, NOTHING, decimals_beside, in_percent, signed
 from app.language.times import written
 
 Kind = Literal["text", "count", "deviation", "width", "size", "number", "probability", "share", "moment"]
@@ -63,6 +63,15 @@ class Value:
         return self.value * 100 if self.kind == "share" else self.value
 
     @property
+    def shown_decimals(self) -> int:
+        """Decimals in a cell: more where fewer would round a share to all or none, or a probability across a level."""
+        if self.kind == "share":
+            return decimals_beside(self.number or 0, 3, 0, 100)
+        return (
+            decimals_beside(self.number or 0, self.decimals, *LEVELS) if self.kind == "probability" else self.decimals
+        )
+
+    @property
     def moment(self) -> datetime | None:
         """The moment, in UTC."""
         return datetime.fromisoformat(str(self.value)) if self.kind == "moment" and self.value else None
@@ -92,7 +101,7 @@ class Value:
             case "deviation":
                 text = signed(number, self.decimals)
             case _:
-                text = f"{number:.{self.decimals}f}".replace("-", MINUS)
+                text = f"{number:.{self.shown_decimals}f}".replace("-", MINUS)
                 small = number >= 0 if self.kind == "probability" else number > 0
                 if small and not float(f"{number:.{self.decimals}f}"):
                     text = f"<{NO_BREAK_SPACE}{10**-self.decimals:.{self.decimals}f}"

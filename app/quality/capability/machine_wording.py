@@ -1,6 +1,6 @@
 """The words of machine performance and of tolerance intervals."""
 
-from app.core.spc.machine_performance import ASKED_FOR
+from app.core.spc.capability import VERY_CAPABLE
 from app.core.spc.refusal import Refused
 from app.core.spc.tolerance_interval import Method, ToleranceInterval
 from app.language.i18n import _
@@ -32,7 +32,7 @@ def verdict(run: Run) -> str:
     """Pmk against the usual requirement, and the distribution that it is by."""
     assert not isinstance(run.result, Refused)
     assert run.result.pmk is not None
-    met = run.result.pmk.value >= ASKED_FOR - 0.005
+    met = run.result.pmk.value >= VERY_CAPABLE
     sentence = (
         _("It reaches the 1.67 that is usually asked of a machine.")
         if met

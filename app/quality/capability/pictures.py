@@ -2,9 +2,9 @@
 
 from markupsafe import Markup, escape
 
-from app.core.spc.capability import Index
+from app.core.spc.capability import CAPABLE, VERY_CAPABLE, Index
 from app.language.i18n import _
-from app.quality.capability.wording import CAPABLE, VERY_CAPABLE, between, index
+from app.quality.capability.wording import between, index
 
 WIDTH, HEIGHT, MOST = 260.0, 28.0, 3.0
 MARKS = (1.0, CAPABLE, VERY_CAPABLE)

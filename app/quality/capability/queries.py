@@ -43,6 +43,7 @@ from app.loop.characteristics import queries as characteristics
 from app.loop.characteristics.queries import CurrentCharacteristic
 from app.loop.summaries import queries as statistics
 from app.loop.summaries.queries import History, Window
+from app.quality.capability.sigma_within import SigmaBy, sigma_within
 from app.quality.control_charts import queries as control
 from app.quality.control_charts.series_queries import read as read_series
 
@@ -83,7 +84,8 @@ class Judgement:
 
     values: deviations, mm, ascending in time. far: readings that lie far from all others (`far_off`), and how far the furthest
     is, mm. baseline: version of the frozen baseline that statistical control was judged by, None where the readings had to
-    judge themselves. by_fit: the distribution that fits, None where the normal one does.
+    judge themselves. by_fit: the distribution that fits, None where the normal one does. sigma_by: whose differences sigma within
+    is of.
     """
 
     current: CurrentCharacteristic
@@ -105,6 +107,7 @@ class Judgement:
     stability: Stability | Refused
     baseline: int | None
     in_time: InTime | Refused
+    sigma_by: SigmaBy
 
     @property
     def half(self) -> float:
@@ -206,12 +209,13 @@ def capability_of(
     side: Side = "both",
     confidence: float = CONFIDENCE,
     coverage: float = COVERAGE,
+    sigma_by: SigmaBy = SigmaBy.NEIGHBOURS,
 ) -> Study:
     """Judge the readings of the window. Raises `Invalid` for more than ten million."""
     if current.parameters.natural_limit is not NaturalLimit.NONE:
         side = "upper" if current.parameters.natural_limit is NaturalLimit.LOWER else "lower"
     history, faulty, counted = _read(session, current, window)
-    judged = _judged(session, current, window, counted, side, confidence)
+    judged = _judged(session, current, window, counted, side, confidence, sigma_by)
     values, limits, result = judged["values"], judged["limits"], judged["indices"]
     outside, fallout = _outside(counted, judged["versions"], side)
     known = None if isinstance(result, Refused) else result
@@ -259,7 +263,13 @@ def _read(session: Session, current: CurrentCharacteristic, window: Window) -> _
 
 
 def _judged(
-    session: Session, current: CurrentCharacteristic, window: Window, counted: History, side: Side, confidence: float
+    session: Session,
+    current: CurrentCharacteristic,
+    window: Window,
+    counted: History,
+    side: Side,
+    confidence: float,
+    sigma_by: SigmaBy = SigmaBy.NEIGHBOURS,
 ) -> dict[str, Any]:
     """The fields of a `Judgement`."""
     versions = _versions(session, current, counted)
@@ -268,7 +278,15 @@ def _judged(
     limits = Limits(None if side == "upper" else judged.lower, None if side == "lower" else judged.upper, 0.0)
     compensated = not current.parameters.measures_only and bool((np.nan_to_num(counted["compensated"]) != 0).any())
     cautions = (Caution.COMPENSATED,) if compensated else ()
-    indices = or_refused(lambda: capability(values, limits, confidence=confidence, cautions=cautions))
+    indices = or_refused(
+        lambda: capability(
+            values,
+            limits,
+            within=sigma_within(session, current, window, counted, values, sigma_by),
+            confidence=confidence,
+            cautions=cautions,
+        )
+    )
     control_verdict, baseline = _stability(session, current, window, counted, values)
     at, far = counted["measured_at"], far_off(values)
     return {
@@ -291,6 +309,7 @@ def _judged(
         "stability": control_verdict,
         "baseline": baseline,
         "in_time": or_refused(lambda: in_time.in_time(values)),
+        "sigma_by": sigma_by,
     }
 
 
@@ -376,6 +395,7 @@ class Singles:
     grouping: str | None = None
     group_size: int | None = None
     group_pause: float | None = None
+    shifts: str | None = None
     first_sequence: int = 0
     last_sequence: int = 0
     excluded: list[Any] = field(default_factory=list)

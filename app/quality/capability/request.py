@@ -13,6 +13,7 @@ from app.loop.characteristics.queries import CurrentCharacteristic
 from app.loop.summaries import queries as statistics
 from app.quality.capability import queries
 from app.quality.capability.queries import CONFIDENCE, COVERAGE, USUAL, Side, Study
+from app.quality.capability.sigma_within import SigmaBy
 from app.web.choice import InPeriod
 from app.web.fields import LARGEST_ID
 
@@ -25,6 +26,7 @@ class StudyRequest(NamedTuple):
     side: Side
     confidence: float
     coverage: float = COVERAGE
+    sigma_by: SigmaBy = SigmaBy.NEIGHBOURS
 
 
 Last = Annotated[
@@ -44,6 +46,13 @@ Confidence = Annotated[float, Query(gt=0.5, lt=1, allow_inf_nan=False, descripti
 Coverage = Annotated[
     float, Query(gt=0.5, lt=1, allow_inf_nan=False, description="Share of all parts that the tolerance interval holds.")
 ]
+OfSigma = Annotated[
+    SigmaBy,
+    Query(
+        description="What sigma within, and with it Cp and Cpk, is made of: the mean moving range of neighbours, or the pooled variance "
+        "inside the readings of one part, one shift (as the shifts are set now), or neighbours of one nest (spindle, cavity)."
+    ),
+]
 
 
 def study_request(
@@ -52,9 +61,10 @@ def study_request(
     side: OneSide = "both",
     confidence: Confidence = CONFIDENCE,
     coverage: Coverage = COVERAGE,
+    sigma_by: OfSigma = SigmaBy.NEIGHBOURS,
 ) -> StudyRequest:
     """The choice of readings, the same for API and figures."""
-    return StudyRequest(last, period, side, confidence, coverage)
+    return StudyRequest(last, period, side, confidence, coverage, sigma_by)
 
 
 StudyRequestDep = Annotated[StudyRequest, Depends(study_request)]
@@ -84,4 +94,5 @@ def study_of(session: Session, current: CurrentCharacteristic, choice: StudyRequ
         side=choice.side,
         confidence=choice.confidence,
         coverage=choice.coverage,
+        sigma_by=choice.sigma_by,
     )

@@ -16,6 +16,7 @@ from app.loop.summaries import wording as statistics
 from app.quality.capability import fit_wording, machine_wording, wording
 from app.quality.capability.machine_queries import Run
 from app.quality.capability.queries import Study
+from app.quality.capability.sigma_within import SigmaBy
 from app.web.fields import answer_from
 
 
@@ -235,7 +236,10 @@ class CapabilityOut(BaseModel):
     versions: list[InForceOut] = Field(description="By which the readings were judged, the newest reading's last.")
     confidence: float
     mean: float | None
-    sigma_within: float | None = Field(description="Mean moving range / d2.")
+    sigma_within: float | None = Field(description="Of Cp and Cpk.")
+    sigma_by: SigmaBy = Field(
+        description="What sigma within is made of: `neighbours` by their mean moving range / d2, else pooled inside parts, shifts or nests."
+    )
     sigma_overall: float | None
     quote: Literal["cpk", "ppk", "fitted", "percentile", "none"] = Field(description="Which number may be quoted.")
     quoted: "QuotedOut | None" = Field(

@@ -1,21 +1,21 @@
 """The words of capability: verdicts, tests, models in time, and which index may be quoted."""
 
 from app.core.natural import NaturalLimit
-from app.core.spc.capability import Caution, Index
+from app.core.spc.capability import CAPABLE, VERY_CAPABLE, Caution, Index
 from app.core.spc.fitting import Fitted
 from app.core.spc.in_time import ALPHA, InTime, Location, Model, Test
 from app.core.spc.normality import Normality
 from app.core.spc.quoting import Quoting, WhyNot
 from app.core.spc.refusal import Reason, Refused
+from app.core.spc.spread import Estimator
 from app.core.spc.stability import Fired, Stability
 from app.language.i18n import _, ngettext
-from app.language.numbers import fixed, signed, tolerance_um
+from app.language.numbers import beside, probability, signed, tolerance_um
 from app.loop.summaries import wording as statistics
 from app.quality.capability import fit_wording as fits
 from app.quality.capability.queries import Study
+from app.quality.capability.sigma_within import SigmaBy
 
-CAPABLE, VERY_CAPABLE = 4 / 3, 5 / 3
-"""What is usually asked for: four sigma to each limit, five for what matters to safety."""
 MOST_NAMED = 40
 
 
@@ -25,7 +25,7 @@ def verdict(value: float | None) -> tuple[str, str]:
         return _("No number"), "steady"
     if value >= VERY_CAPABLE:
         return _("Very capable"), "steady"
-    if value >= CAPABLE - 0.005:
+    if value >= CAPABLE:
         return _("Capable"), "steady"
     if value >= 1:
         return _("Barely capable"), "waiting"
@@ -97,9 +97,29 @@ def one_sided(study: Study) -> str | None:
     return f"{which.format(edge=edge)} {rest}"
 
 
+def sigma_by(by: SigmaBy) -> str:
+    """The readings whose differences give sigma within."""
+    return {
+        SigmaBy.NEIGHBOURS: _("Neighbours"),
+        SigmaBy.PART: _("Parts"),
+        SigmaBy.SHIFT: _("Shifts"),
+        SigmaBy.NEST: _("Nests, spindles"),
+    }[by]
+
+
+def sigma_within(by: SigmaBy) -> str:
+    """The method of sigma within."""
+    return {
+        SigmaBy.NEIGHBOURS: statistics.estimator(Estimator.MOVING_RANGE),
+        SigmaBy.PART: _("pooled variance inside the readings of one part"),
+        SigmaBy.SHIFT: _("pooled variance inside the readings of one shift"),
+        SigmaBy.NEST: _("pooled variance inside neighbours of one nest or spindle"),
+    }[by]
+
+
 def index(value: float | None) -> str:
-    """An index with the digits it deserves."""
-    return fixed(value, 2)
+    """An index with the digits it deserves, never rounded across what is usually asked for."""
+    return beside(value, 2, 1.0, CAPABLE, VERY_CAPABLE)
 
 
 def between(found: Index | Quoting | None) -> str:
@@ -122,7 +142,7 @@ def ppm(value: float | None) -> str:
 
 def p_value(p: float) -> str:
     """A probability as one reads it."""
-    return _("p < 0.001") if p < 0.001 else f"p = {p:.3f}"
+    return f"p {probability(p, '= ')}"
 
 
 def normality(test: Normality | Refused) -> str:

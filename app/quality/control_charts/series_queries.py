@@ -103,11 +103,7 @@ def read(session: Session, current: CurrentCharacteristic, plan: Plan, window: W
         keep &= ~unknown
         values = wear.wear(values, history["compensated"], plan.factor)
     begins = _begins(session, current, history["received_at"], history["measured"] - history["deviation"])
-    labels = np.zeros_like(sequence)
-    if plan.grouping == "shift":
-        labels = _shifts(history["measured_at"], plan.shifts)
-    elif plan.grouping in ("part", "nest"):
-        labels = _labels(session, current, window, sequence, plan.grouping)
+    labels = labels_of(session, current, window, sequence, history["measured_at"], plan.grouping, plan.shifts)
     left_out = LeftOut(sequence[history.excluded], sequence[by_plan], sequence[faults], sequence[unknown])
     return ReadingSeries(
         Series(sequence, values, begins).only(keep), history["measured_at"][keep], labels[keep], left_out
@@ -144,6 +140,32 @@ def _begins(
 
 def _naive(moment: datetime) -> np.datetime64:
     return np.datetime64(moment.replace(tzinfo=None), "us")
+
+
+def labels_of(
+    session: Session,
+    current: CurrentCharacteristic,
+    window: Window,
+    sequence: Whole,
+    measured_at: Moments,
+    by: str | None,
+    shifts: str | None = None,
+) -> Whole:
+    """A number for the part, shift or nest of each of these readings of the window; 0 where it names none, and for other groupings."""
+    if by == "shift":
+        return _shifts(measured_at, shifts)
+    return _labels(session, current, window, sequence, by) if by in ("part", "nest") else np.zeros_like(sequence)
+
+
+def begin_of_runs(labels: Whole) -> NDArray[np.bool_]:
+    """Mask of the readings with another label than the one before; one without a label stands alone.
+
+    >>> begin_of_runs(np.array([1, 1, 2, 0, 0])).tolist()
+    [True, False, True, True, True]
+    """
+    new = np.ones(len(labels), np.bool_)
+    new[1:] = (np.diff(labels) != 0) | (labels[1:] == 0)
+    return new
 
 
 def _shifts(measured_at: Moments, kept: str | None) -> Whole:
@@ -217,10 +239,8 @@ def groups_of(plan: Plan, series: ReadingSeries, window: Window) -> tuple[Whole,
 
 
 def _parted(plan: Plan, series: ReadingSeries) -> Whole:
+    if plan.grouping != "pause":
+        return np.cumsum(begin_of_runs(series.labels))
     new = np.ones(len(series.labels), np.bool_)
-    if plan.grouping == "pause":
-        pause = np.timedelta64(round((plan.group_pause or 0) * 60e6), "us")
-        new[1:] = np.diff(series.measured_at) > pause
-    else:
-        new[1:] = (np.diff(series.labels) != 0) | (series.labels[1:] == 0)
+    new[1:] = np.diff(series.measured_at) > np.timedelta64(round((plan.group_pause or 0) * 60e6), "us")
     return np.cumsum(new)

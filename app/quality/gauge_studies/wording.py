@@ -10,7 +10,7 @@ from app.core.spc.gauge.linearity import Linearity
 from app.core.spc.gauge.single import Bias, TypeOne
 from app.core.spc.refusal import Refused
 from app.language.i18n import _, ngettext
-from app.language.numbers import fixed, plain_um, signed
+from app.language.numbers import beside, decimals_beside, fixed, plain_um, probability, signed
 from app.loop.summaries import wording as statistics
 from app.quality.capability import wording as capabilities
 from app.quality.gauge_studies.evaluation import Evaluation
@@ -53,16 +53,17 @@ def kinds() -> list[tuple[str, str, str, str]]:
 
 def share(value: float) -> str:
     """A percentage."""
-    return "–" if isnan(value) else f"{value:.1f}\N{NARROW NO-BREAK SPACE}%"
+    return "–" if isnan(value) else f"{in_percent(value)}\N{NARROW NO-BREAK SPACE}%"
 
 
-def p_value(p: float, equal: str = "") -> str:
-    """A probability as one reads it.
+def in_percent(value: float) -> str:
+    """The same without its unit: read beside the limits of AIAG."""
+    return beside(value, 1, GOOD_SHARE, USABLE_SHARE)
 
-    >>> p_value(0.0004), p_value(0.974), p_value(0.974, "= ")
-    ('< 0.001', '0.974', '= 0.974')
-    """
-    return "< 0.001" if p < 0.001 else f"{equal}{p:.3f}"
+
+def _end(length: float) -> str:
+    """An end of an interval of a bias, µm: read beside 0."""
+    return signed(length * 1000, decimals_beside(length * 1000, 2, 0.0))
 
 
 def verdicts(found: Evaluation, tolerance: float | None) -> list[Verdict]:
@@ -89,7 +90,7 @@ def _type_one(found: TypeOne) -> list[Verdict]:
         verdicts.append(
             Verdict(
                 name,
-                fixed(value, 2),
+                beside(value, 2, LEAST_CG),
                 _("capable") if good else _("not capable"),
                 "steady" if good else "attention",
                 limit,
@@ -114,9 +115,7 @@ def _bias(found: Bias) -> Verdict:
         f"{signed(found.bias * 1000, 2)}\N{NO-BREAK SPACE}µm",
         _("significant") if found.significant else _("not significant"),
         "waiting" if found.significant else "steady",
-        _("95 % interval {low} to {high} µm").format(
-            low=signed(found.low * 1000, 2), high=signed(found.high * 1000, 2)
-        ),
+        _("95 % interval {low} to {high} µm").format(low=_end(found.low), high=_end(found.high)),
     )
 
 
@@ -158,9 +157,9 @@ def _linearity(found: Linearity) -> list[Verdict]:
             _("{slope} µm per mm").format(slope=signed(found.slope.value * 1000, 3)),
             _("error depends on size") if found.by_size else _("same error at all sizes"),
             "attention" if found.by_size else "steady",
-            _("the biases do not lie on a line: read each, p {p}").format(p=p_value(found.beside.p_value, "= "))
+            _("the biases do not lie on a line: read each, p {p}").format(p=probability(found.beside.p_value, "= "))
             if found.bent and found.beside is not None
-            else _("slope of the bias, p {p}").format(p=p_value(found.slope.p_value, "= ")),
+            else _("slope of the bias, p {p}").format(p=probability(found.slope.p_value, "= ")),
         ),
         Verdict(
             _("Bias against zero"),
@@ -176,14 +175,14 @@ def _linearity(found: Linearity) -> list[Verdict]:
             f"{signed(found.average_bias * 1000, 2)}\N{NO-BREAK SPACE}µm",
             _("significant") if biased else _("not significant"),
             "attention" if biased else "steady",
-            _("95 % interval {low} to {high} µm").format(low=signed(low * 1000, 2), high=signed(high * 1000, 2)),
+            _("95 % interval {low} to {high} µm").format(low=_end(low), high=_end(high)),
         ),
         Verdict(
             _("Intercept"),
             f"{signed(found.intercept.value * 1000, 2)}\N{NO-BREAK SPACE}µm",
             _("significant") if found.intercept.p_value < 1 - found.confidence else _("not significant"),
             "attention" if found.intercept.p_value < 1 - found.confidence else "steady",
-            _("bias of the line at size 0, p {p}").format(p=p_value(found.intercept.p_value, "= ")),
+            _("bias of the line at size 0, p {p}").format(p=probability(found.intercept.p_value, "= ")),
         ),
         Verdict(
             _("Accepted"),
@@ -222,7 +221,7 @@ def pooling(found: Study) -> str:
             "The interaction counts separately (p {p}, not above the {limit} of AIAG): operators differ by part. Parts and operators are tested against it."
         )
     p = tested[0].p_value
-    return words.format(p=p_value(p, "" if found.pooled else "= "), limit=POOLED_ABOVE)
+    return words.format(p=probability(p, "" if found.pooled else "= "), limit=POOLED_ABOVE)
 
 
 def zeroed(found: Study) -> str:

@@ -20,7 +20,8 @@ from app.quality.capability import fit_wording, machine_wording, wording
 from app.quality.capability.machine_queries import newest_run
 from app.quality.capability.pictures import interval
 from app.quality.capability.queries import CONFIDENCE, USUAL, Side
-from app.quality.capability.request import Confidence, Last, OneSide, StudyRequest, study_of
+from app.quality.capability.request import Confidence, Last, OfSigma, OneSide, StudyRequest, study_of
+from app.quality.capability.sigma_within import SigmaBy
 from app.quality.gauge_studies import queries as gauges
 from app.quality.gauge_studies import wording as gauge_wording
 from app.quality.proof import queries as proof
@@ -35,7 +36,7 @@ RUNS = ("125", "500", "1000", "5000", "all")
 
 
 def _typed(
-    given: dict[str, str], last: str | None, side: Side, confidence: float
+    given: dict[str, str], last: str | None, side: Side, confidence: float, sigma_by: SigmaBy
 ) -> tuple[StudyRequest, dict[str, str]]:
     """Read the typed window, with errors by field; if there are any, the last readings. Moments are of the plant's time zone, unless another is named."""
     errors: dict[str, str] = {}
@@ -48,7 +49,7 @@ def _typed(
         period = periods.period_of(given, zone)
     except Invalid as error:
         errors |= by_field(error)
-    return StudyRequest(last, ALWAYS if errors else period, side, confidence), errors
+    return StudyRequest(last, ALWAYS if errors else period, side, confidence, sigma_by=sigma_by), errors
 
 
 Typed = Annotated[str, Query(max_length=64)]
@@ -66,15 +67,16 @@ def capability_page(
     last: Last = None,
     side: OneSide = "both",
     confidence: Confidence = CONFIDENCE,
+    sigma_by: OfSigma = SigmaBy.NEIGHBOURS,
 ) -> Response:
     """Indices with intervals and what they are worth, spread and shape, behaviour in time, the tool without corrections."""
     typed = {"from": start, "to": end, "timezone": timezone}
-    choice, errors = _typed(typed, last, side, confidence)
+    choice, errors = _typed(typed, last, side, confidence, sigma_by)
     current = characteristics.characteristic_named(session, characteristic)
     study = study_of(session, current, choice)
     path = f"/characteristics/{current.characteristic.key}/capability"
     now = _query(choice)
-    kept = {name: value for name, value in now.items() if name in {"side", "confidence"}}
+    kept = {name: value for name, value in now.items() if name in {"side", "confidence", "sigma_by"}}
 
     def link(**changes: Any) -> str:
         unchanged = now if not changes.keys() & {"last", "from"} else kept
@@ -113,6 +115,10 @@ def capability_page(
             )
             if study.natural_limit is NaturalLimit.NONE
         ],
+        sigmas=[
+            (wording.sigma_by(by), link(sigma_by=None if by is SigmaBy.NEIGHBOURS else by.value), by is choice.sigma_by)
+            for by in SigmaBy
+        ],
         figure=figure,
         interval=interval,
         refused=lambda value: isinstance(value, Refused),
@@ -138,6 +144,7 @@ def _query(choice: StudyRequest) -> dict[str, str]:
         "last": choice.last,
         **in_address(choice.period),
         "side": None if choice.side == "both" else choice.side,
+        "sigma_by": None if choice.sigma_by is SigmaBy.NEIGHBOURS else choice.sigma_by.value,
         "confidence": None if choice.confidence == 0.95 else f"{choice.confidence:g}",
     }
     return {name: value for name, value in named.items() if value is not None}

@@ -6,6 +6,7 @@ from typing import Annotated
 from fastapi import APIRouter, Query, Request, Response
 
 from app.access.deps import require
+from app.core.spc.capability import CAPABLE
 from app.loop.machines import queries as machines
 from app.quality.capability import wording as capability_wording
 from app.quality.capability.queries import USUAL
@@ -15,7 +16,7 @@ from app.quality.wear.queries import next_event
 from app.views.characteristic.wording import state_word
 from app.views.overview import queries, wording
 from app.views.overview.queries import By
-from app.views.overview.ranking import CAPABLE
+from app.views.overview.ranking import ALARM_FLOOD
 from app.web.deps import FROM_REPLICA, SessionDep, Sought
 from app.web.paging import address, holds, slice_of
 from app.web.templates import page
@@ -72,6 +73,7 @@ def overview_page(
         state_word=state_word,
         next_event=next_event,
         capable=CAPABLE,
+        alarm_flood=ALARM_FLOOD,
         last=USUAL,
         capability_wording=capability_wording,
         now=datetime.now(UTC),

@@ -8,10 +8,9 @@ from dataclasses import dataclass
 from enum import IntEnum
 from math import inf
 
+from app.core.spc.capability import CAPABLE
 from app.core.state import NEED_SOMEONE, CharacteristicState
 
-CAPABLE = 1.33
-"""Cpk or Ppk from which a process is usually called capable (ISO 22514-2; AIAG SPC asks for 1.33 or more)."""
 NEAR = 100
 """Parts: a limit that wear comes to sooner than this is to be planned for now."""
 ALARM_FLOOD = 1.0

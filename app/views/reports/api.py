@@ -15,6 +15,8 @@ from app.files.documents.schemas import ReportOut
 from app.files.formats import periods
 from app.language.times import plant_zone
 from app.loop.characteristics import queries as characteristics
+from app.quality.capability.request import OfSigma
+from app.quality.capability.sigma_within import SigmaBy
 from app.views.reports import queries
 from app.views.reports.request import EVERYTHING, ReportRequest, SectionName, section_names, zone_or_plants
 from app.web.api import CharacteristicKey, api_router, problems
@@ -57,13 +59,14 @@ def request_from_query(
             examples=["Europe/Belgrade"],
         ),
     ] = None,
+    sigma_by: OfSigma = SigmaBy.NEIGHBOURS,
 ) -> ReportRequest:
     """Request for a report, from the query; a day is one of the time zone that is named, as in a command."""
     zone = zone_or_plants(timezone)
     if timezone and zone.key == timezone:
         period = periods.period_of(request.query_params, zone)
     many = EVERYTHING if last == "all" else int(last) if last else None
-    return ReportRequest(period, many, section_names(section), paper, timezone or plant_zone().key)
+    return ReportRequest(period, many, section_names(section), paper, timezone or plant_zone().key, sigma_by)
 
 
 ReportQuery = Annotated[ReportRequest, Depends(request_from_query)]

@@ -13,6 +13,7 @@ from app.files.documents.content import Paper
 from app.files.formats import cell_values, periods
 from app.language.i18n import _
 from app.language.times import plant_zone
+from app.quality.capability.sigma_within import SigmaBy
 
 LAST = USUAL_READINGS
 """Readings of a report for which no period was named."""
@@ -57,6 +58,7 @@ class ReportRequest:
     sections: Sequence[SectionName] = field(default=tuple(SectionName))
     paper: Paper = Paper.A4
     zone: str = field(default_factory=lambda: plant_zone().key)
+    sigma_by: SigmaBy = SigmaBy.NEIGHBOURS
 
     def __post_init__(self) -> None:
         """Raises `Invalid` for a period that runs backwards and for a time zone that there is not."""

@@ -1,7 +1,11 @@
 """Tolerance intervals and machine performance: what they hold, and when they are refused."""
 
+from math import exp, lgamma, log, pi, sqrt
+
 import numpy as np
 import pytest
+from scipy.integrate import quad
+from scipy.optimize import brentq
 from scipy.stats import nct, norm
 
 from app.core.spc.capability import Limits
@@ -55,6 +59,40 @@ def test_a_run_of_a_machine_has_the_indices_of_all_its_parts() -> None:
     chip[7] = 400.0
     far = machine_performance(chip, Limits(-10, 10))
     assert (far.far, far.pm, far.pmk) == ((7,), None, None)
+
+
+def test_pm_pmk_and_their_intervals_by_numerical_integration() -> None:
+    """No published case could be found, so by another way: quantiles and probabilities integrated from densities.
+
+    Pm = (U - L)/(X99.865 - X0.135) with quantiles where the integral of the density reaches 0.135 % and 99.865 %, which are 3 s
+    from the mean to 1e-5. The ends of the interval of Pm are those at which a deviation as small (as large) as s has the
+    probability 2.5 %, by the integral of the density of chi-square with 49 degrees of freedom.
+    """
+    values = np.random.default_rng(5).normal(1, 2, 50)
+    found = machine_performance(values, Limits(-10, 10))
+    assert found.pm
+    assert found.pmk
+    assert found.pm.low is not None
+    assert found.pm.high is not None
+    mean = sum(values) / 50
+    s = sqrt(sum((value - mean) ** 2 for value in values) / 49)
+
+    def density(z: float) -> float:
+        return exp(-z * z / 2) / sqrt(2 * pi)
+
+    def reach(share: float) -> float:
+        return float(brentq(lambda z: 0.5 + quad(density, 0, z)[0] - share, -6, 6))
+
+    low, high = mean + s * reach(0.00135), mean + s * reach(0.99865)
+    assert found.pm.value == pytest.approx(20 / (high - low), rel=1e-4)
+    assert found.pmk.value == pytest.approx(min((10 - mean) / (high - mean), (mean + 10) / (mean - low)), rel=1e-4)
+
+    def chi_square(x: float) -> float:
+        return exp(23.5 * log(x) - x / 2 - 24.5 * log(2) - lgamma(24.5))
+
+    for end, share in ((found.pm.low, 0.025), (found.pm.high, 0.975)):
+        true_s = 20 / (6 * end)
+        assert quad(chi_square, 0, 49 * (s / true_s) ** 2)[0] == pytest.approx(share, abs=1e-6)
 
 
 def test_a_run_of_form_is_by_the_distribution_that_begins_at_its_natural_limit() -> None:

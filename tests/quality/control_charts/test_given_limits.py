@@ -30,7 +30,12 @@ def line(shop: Shop) -> Line:
 
 
 def frozen(line: Line, status: int = 201, **more: Any) -> Any:
-    body = {"quantity": "deviation", "first_sequence": 1, "last_sequence": 60, "reason": "Drawing 4711"} | more
+    body: dict[str, Any] = {
+        "quantity": "deviation",
+        "first_sequence": 1,
+        "last_sequence": 60,
+        "reason": "Drawing 4711",
+    } | more
     return line.shop.call("POST", f"/characteristics/{line.key}/baselines", status, **body)
 
 

@@ -248,5 +248,6 @@ def _titled(name: str, rows: Sequence[Sequence[Value]], at: int, zone: ZoneInfo 
 
 
 def _shape(value: Value) -> str:
-    digits = f"0.{'0' * value.decimals}" if value.decimals else "0"
-    return {"count": "#,##0", "deviation": f"+{digits};-{digits};{digits}", "share": "0.000"}.get(value.kind, digits)
+    decimals = value.shown_decimals
+    digits = f"0.{'0' * decimals}" if decimals else "0"
+    return {"count": "#,##0", "deviation": f"+{digits};-{digits};{digits}"}.get(value.kind, digits)

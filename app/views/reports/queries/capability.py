@@ -18,7 +18,7 @@ FEW = 100  # of a million: more than these are reported without decimals
 
 def capability(frame: Frame) -> Section:
     """Cp, Cpk, Pp, Ppk and Cpm with intervals; of a corrected process also of the tool without corrections."""
-    study = capabilities.capability_of(frame.session, frame.current, frame.window)
+    study = capabilities.capability_of(frame.session, frame.current, frame.window, sigma_by=frame.request.sigma_by)
     title = _("Capability")
     if isinstance(study.indices, Refused):
         why = _("No capability: {why}").format(why=statistics.refusal(study.indices))
@@ -103,7 +103,9 @@ def _spread(study: Study) -> list[Fact]:
     facts = [
         Fact("readings", _("Readings"), count(indices.readings)),
         Fact("mean", _("Mean deviation"), deviation(indices.mean, 2)),
-        Fact("sigma_within", _("Sigma within"), width(indices.within.value, 3)),
+        Fact(
+            "sigma_within", _("Sigma within"), width(indices.within.value, 3), note=wording.sigma_within(study.sigma_by)
+        ),
         Fact("sigma_overall", _("Sigma overall"), width(indices.overall.value, 3)),
         Fact("outside", _("Counted out of tolerance"), count(study.outside)),
     ]
