@@ -172,10 +172,10 @@ def _shifts(measured_at: Moments, kept: str | None) -> Whole:
     """Shifts in which these moments lie, as the baseline kept them (of old: the plant's), as numbers from 1 that grow."""
     if not len(measured_at):
         return np.zeros(0, np.int64)
-    ends = (
+    first, last = (
         moment.astype("datetime64[us]").item().replace(tzinfo=UTC) for moment in (measured_at.min(), measured_at.max())
     )
-    begins = [_naive(begin.astimezone(UTC)) for begin in begins_of_shifts(*ends, kept)]
+    begins = [_naive(begin.astimezone(UTC)) for begin in begins_of_shifts(first, last, kept)]
     return np.searchsorted(np.array(begins), measured_at, side="right").astype(np.int64)
 
 

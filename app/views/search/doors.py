@@ -29,6 +29,11 @@ def doors() -> list[Door]:
             "/overview",
             _("ranking, statistics, Cp, Cpk, Pp, Ppk, capability, control charts, run rules, what-if"),
         ),
+        Door(
+            _("Charts of counts"),
+            "/count-charts",
+            _("p, np, c, u, Laney, attributes, rejected parts, nonconformities; counts are typed in, not stored"),
+        ),
         Door(_("Compare"), "/compare", _("side by side, small multiples, before and after, versions, tools, periods")),
         Door(_("Gauge studies"), "/gauges", _("Cg, Cgk, %GRR, ndc, R&R, bias, linearity, measuring system, MSA")),
         Door(_("Reports"), "/reports", _("PDF, spreadsheet, XLSX, CSV, hand over")),

@@ -433,3 +433,35 @@ def test_the_page_greys_what_must_not_be_quoted(viewer: Person, shop: Shop) -> N
     assert "Do not report Cp and Cpk" in page
     assert page.count("do not report") >= 2
     assert "No gauge study yet" in page
+
+
+def test_sigma_within_is_pooled_by_choice(shop: Shop, viewer: Person) -> None:
+    """Pairs of one part: the mean of their squared differences is twice the pooled variance; of spindles every pair is two."""
+    key = shop.another("pooled", mode="measure_only", tool_memory=0)
+    parts = [f"SN-{n // 2}" for n in range(80)]
+    moments = [f"2026-10-{1 + n // 4:02d}T{n % 4 * 6 + 1:02d}:00:00Z" for n in range(80)]
+    values = quiet(80)
+    shop.push(
+        values,
+        key,
+        part=parts,
+        measured_at=moments,
+        context=[{"nest": n % 2 + 1} for n in range(80)],
+    )
+    usual, pooled = of(shop, characteristic=key), of(shop, "last=all&sigma_by=part", key)
+    assert (usual["sigma_by"], pooled["sigma_by"]) == ("neighbours", "part")
+    sigma = (sum((one - other) ** 2 for one, other in zip(values[::2], values[1::2], strict=True)) / 80) ** 0.5
+    assert pooled["sigma_within"] * 1000 == pytest.approx(sigma)
+    assert pooled["cp"]["value"] == pytest.approx(16 / (6 * sigma))
+    assert usual["sigma_within"] != pooled["sigma_within"]
+    assert (usual["sigma_overall"], usual["ppk"]) == (pooled["sigma_overall"], pooled["ppk"])
+    assert of(shop, "last=all&sigma_by=shift", key)["sigma_within"] > 0
+    assert "0 subgroups with two readings or more" in of(shop, "last=all&sigma_by=nest", key)["refused"]
+    of(shop, "sigma_by=pallet", key, 422)
+    said = "pooled variance inside the readings of one part"
+    shown = viewer.open(f"/characteristics/{key}/capability?last=all&sigma_by=part")
+    assert said in shown
+    assert "section=capability&amp;sigma_by=part" in shown
+    report = shop.call("GET", f"/characteristics/{key}/report?section=capability&last=all&sigma_by=part")
+    (fact,) = [fact for fact in report["sections"][0]["facts"] if fact["key"] == "sigma_within"]
+    assert said in fact["note"]

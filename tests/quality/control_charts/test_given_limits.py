@@ -116,7 +116,7 @@ def test_page_and_figure_say_who_gave_the_limits(line: Line, engineer: Person) -
     assert "centre=0.0006" in text
     wrong = engineer.open(f"{path}?first_sequence=1&last_sequence=60&limits.lower=0.1", 422)
     assert "limits are a lower and an upper one" in wrong
-    engineer.post(path, **typed, reason="Drawing 4711")
+    engineer.post(path, **typed, quantity="deviation", chart="individuals", reason="Drawing 4711")
     shown = engineer.open(f"/characteristics/{line.key}/control")
     assert "degrees of freedom" not in shown
     figure = line.shop.call("GET", f"/characteristics/{line.key}/figures/control")
