@@ -94,7 +94,7 @@ def begin_of_shift(at: datetime) -> datetime:
 
 
 def shifts_now() -> str:
-    """When the shifts of the plant begin, and by the clock of which zone, to be kept with what was grouped by them."""
+    """Beginnings of the plant's shifts, and the zone of their clock, to be kept with what was grouped by them."""
     plant = _time()
     return f"{','.join(f'{begin:%H:%M}' for begin in plant.shifts)} {plant.zone.key}"
 
