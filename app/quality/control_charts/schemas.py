@@ -38,7 +38,7 @@ class LimitsIn(Body):
         description="Limits at 3 sigma, as they are drawn on the individuals or X̄ chart. For subgroups only `consecutive`: "
         "those of one size have one limit. With a `centre` it lies in the middle.",
     )
-    upper: Limit | None = None
+    upper: Limit | None = Field(None, description="The other one of the two.")
 
 
 class PeriodIn(Body):
