@@ -186,8 +186,10 @@ def _limit_lines(drawn: CapabilityChart, low: float, high: float, *, percentiles
     if percentiles and drawn.percentiles is not None and (drawn.fitted is not None or not drawn.normal):
         pen = Pen("correction", dash="6px,3px")
         lines += [
-            Rule(pen, x=value, words=name, colour="correction", raised=14)
-            for value, name in zip(drawn.percentiles, ("0.135 %", "50 %", "99.865 %"), strict=True)
+            Rule(pen, x=value, words=name, colour="correction", raised=raised)
+            for value, name, raised in zip(
+                drawn.percentiles, ("0.135 %", "50 %", "99.865 %"), (14, 28, 14), strict=True
+            )
         ]
     return [
         replace(line, x=line.x * 1000, front=True)

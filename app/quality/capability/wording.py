@@ -350,7 +350,7 @@ def cautions(study: Study) -> list[str]:
     sentences = [
         _not_normal(study) if caution is Caution.NOT_NORMAL else statistics.caution(caution)
         for caution in study.indices.cautions
-        if caution is not Caution.NOT_IN_CONTROL or study.stable is not False
+        if caution is not Caution.NOT_IN_CONTROL or (study.stable is not False and study.normal)
     ]
     if study.quote == "percentile" and not isinstance(study.by_percentile, Refused):
         sentences += [statistics.caution(caution) for caution in study.by_percentile.cautions]

@@ -225,7 +225,7 @@ def _cautions(
     if baseline.provisional:
         cautions.append((Caution.PROVISIONAL, baseline.readings))
     if baseline.signals:
-        cautions.append((Caution.SIGNALS, baseline.signals))
+        cautions.append((Caution.BEYOND_GIVEN if baseline.given else Caution.SIGNALS, baseline.signals))
     if baseline.normal_p is not None and baseline.normal_p < NOT_NORMAL:
         cautions.append((Caution.NOT_NORMAL, 0))
     correlation = summary(values).autocorrelation if len(values) > 1 else None

@@ -21,7 +21,8 @@ def limits_of(period: PeriodIn) -> shewhart.Baseline | None:
     if limits.lower is None or limits.upper is None:
         return shewhart.given(limits.centre or 0.0, limits.sigma or 0.0)
     size = 1 if period.chart == "individuals" else period.group_size or 1
-    return shewhart.given((limits.lower + limits.upper) / 2, (limits.upper - limits.lower) / 6 * sqrt(size))
+    centre = round((limits.lower + limits.upper) / 2, 12)  # as it would be typed, not 0.00039999999999999986
+    return shewhart.given(centre, (limits.upper - limits.lower) / 6 * sqrt(size))
 
 
 def against(period: PeriodIn) -> list[FieldError]:

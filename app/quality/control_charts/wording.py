@@ -16,6 +16,7 @@ class Caution(StrEnum):
 
     PROVISIONAL = "provisional"
     SIGNALS = "signals"
+    BEYOND_GIVEN = "beyond_given"
     NOT_NORMAL = "not_normal"
     CORRELATED = "correlated"
     CORRECTED = "corrected"
@@ -33,6 +34,12 @@ def caution(which: Caution, count: int = 0) -> str:
             return ngettext(
                 "%(num)d point of the period itself lies beyond its limits. Find out why, and leave it out with the reason, or choose a quieter period.",
                 "%(num)d points of the period itself lie beyond its limits. Find out why, and leave them out with the reason, or choose a quieter period.",
+                count,
+            ) % {"num": count}
+        case Caution.BEYOND_GIVEN:
+            return ngettext(
+                "%(num)d point of the period lies beyond the limits that were given: the process is not as they say.",
+                "%(num)d points of the period lie beyond the limits that were given: the process is not as they say.",
                 count,
             ) % {"num": count}
         case Caution.NOT_NORMAL:
