@@ -462,6 +462,6 @@ def test_sigma_within_is_pooled_by_choice(shop: Shop, viewer: Person) -> None:
     shown = viewer.open(f"/characteristics/{key}/capability?last=all&sigma_by=part")
     assert said in shown
     assert "section=capability&amp;sigma_by=part" in shown
-    report = shop.call("GET", f"/characteristics/{key}/report?section=capability&last=all&sigma_by=part")
+    report = shop.call("GET", f"/characteristics/{key}/report.json?section=capability&last=all&sigma_by=part")
     (fact,) = [fact for fact in report["sections"][0]["facts"] if fact["key"] == "sigma_within"]
     assert said in fact["note"]
