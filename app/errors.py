@@ -21,6 +21,7 @@ Each carries what is wrong (`detail`), where (`errors`) and what to do about it 
 that a machinist understands. The web layer makes RFC 9457 problem documents or problem pages of them.
 """
 
+import re
 from collections.abc import Iterable
 from typing import Any, NamedTuple, Self
 
@@ -29,6 +30,17 @@ from app.logs import REQUEST
 
 PROBLEM_JSON = "application/problem+json"
 """Media type of RFC 9457."""
+
+
+def for_people(what_to_do: str | None) -> str:
+    """The advice without the calls of the API in it, which are of no use to a person at a page.
+
+    >>> for_people("Check the key; GET /api/v1/machines lists them.")
+    'Check the key.'
+    """
+    sentences = re.split(r"(?<=[.;])\s+", what_to_do or "")
+    kept = " ".join(sentence for sentence in sentences if "/api/" not in sentence)
+    return f"{kept[:-1]}." if kept.endswith(";") else kept
 
 
 class FieldError(NamedTuple):
@@ -65,6 +77,11 @@ class InbandError(Exception):
     def headers(self) -> dict[str, str]:
         """Headers that belong to the answer."""
         return {} if self.retry_after is None else {"Retry-After": str(self.retry_after)}
+
+    @property
+    def advice(self) -> str:
+        """The remedy, for a person at a page; empty where there is none."""
+        return for_people(self.what_to_do)
 
     def as_problem(self) -> dict[str, Any]:
         """The RFC 9457 problem document, with the id of the request that is being answered."""

@@ -9,6 +9,7 @@ from typing import Any
 from starlette.requests import Request
 from starlette.responses import HTMLResponse
 
+from app.errors import for_people
 from app.language.i18n import _
 from app.web.templates import page
 
@@ -18,7 +19,8 @@ def problem_page(
 ) -> HTMLResponse:
     """The page for an RFC 9457 problem (`title`, `status`, `detail`, `errors`, `what_to_do`, `request_id`)."""
     whole = {"detail": "", "errors": [], "what_to_do": None, "request_id": None} | dict(problem)
-    if whole["status"] == HTTPStatus.NOT_FOUND:  # anyone who reads a page has no use for the calls of the API
+    whole["what_to_do"] = for_people(whole["what_to_do"])
+    if whole["status"] == HTTPStatus.NOT_FOUND:
         whole["what_to_do"] = _(
             "Check the address, or start from the plant page: an old link may point to something deleted."
         )

@@ -153,7 +153,7 @@ def carry_out(verb: Act[On, Sent], on: On, form: Mapping[str, str]) -> Outcome:
         on.session.expire_all()
         if verb.asks_again(error):
             return Outcome("ask", usual)
-        refused = f"{error.detail} {error.what_to_do or ''}"
+        refused = f"{error.detail} {error.advice}"
         return Outcome("done" if verb.own(on) else "late", usual, None, refused)
     return Outcome("done", result if isinstance(result, Said) else usual, result)
 

@@ -351,7 +351,7 @@ def _asked(session: Session, at: AtStation, form: Mapping[str, str], error: Inba
     """Content of every second touch: what was typed, what was wrong, and on a device the question who acts."""
     errors: dict[str, str] = {}
     if error is not None:
-        errors = by_field(error) or {"who": f"{error.detail} {error.what_to_do or ''}".strip()}
+        errors = by_field(error) or {"who": f"{error.detail} {error.advice}".strip()}
     return {
         "form": form,
         "errors": errors,
