@@ -52,9 +52,7 @@ def shape(kind: str, form: Mapping[str, str]) -> Grid:
     lines = _whole(typed, "lines", _("lines"))
     columns = max(1, len(operators)) * trials
     if lines * columns > MOST_CELLS:
-        wrong = _("makes {cells} cells; at most {most} fit a page, the API takes 10 000").format(
-            cells=lines * columns, most=MOST_CELLS
-        )
+        wrong = _("makes {cells} cells; at most {most} fit a page").format(cells=lines * columns, most=MOST_CELLS)
         raise _wrong("lines", wrong)
     names = [str(place + 1) for place in range(lines)] if kind == "grr" else [""] * lines
     return Grid(names, operators, trials, [[""] * columns for _line in range(lines)])

@@ -96,13 +96,24 @@ def new_page(
         return page(
             request, "gauge_studies/kinds.html", kinds=wording.kinds(), machine=machine, characteristic=characteristic
         )
-    typed = {"machine": machine, "characteristic": characteristic}
-    if characteristic:
-        current = characteristics.characteristic_named(session, characteristic)
-        p = current.parameters
-        typed |= {"machine": current.machine.key, "tolerance": as_typed(p.tolerance_width)}
-        typed |= {"reference": as_typed(p.target)} if kind in {"type_one", "bias"} else {}
+    typed = _of_characteristic(session, kind, {"machine": machine, "characteristic": characteristic})
     return _form(request, session, kind, typed, form_reader.shape(kind, typed))
+
+
+def _of_characteristic(session: Session, kind: str, typed: Mapping[str, str]) -> dict[str, str]:
+    """The form with the machine of the chosen characteristic, and where they are empty its tolerance and target.
+
+    The target is a suggestion for the true size, to be seen before the study is stored: what is stored now gets none.
+    """
+    key = typed.get("characteristic", "").strip()
+    if not key:
+        return dict(typed)
+    current = characteristics.characteristic_named(session, key)
+    suggested = {"tolerance": as_typed(current.parameters.tolerance_width)}
+    if kind in {"type_one", "bias"} and typed.get("do") != "store":
+        suggested["reference"] = as_typed(current.parameters.target)
+    said = {name: text for name, text in typed.items() if text.strip()}
+    return dict(typed) | suggested | said | {"machine": current.machine.key}
 
 
 @router.post("/gauges/new")
@@ -112,6 +123,7 @@ def send_new(request: Request, session: SessionDep, caller: Operator, form: Form
     if kind not in KINDS:
         raise NotFound(_("There is no such kind of gauge study."), _("Choose one on the page “New gauge study”."))
     try:
+        typed = _of_characteristic(session, kind, typed)
         with session.begin_nested():
             filled = _filled(session, kind, typed)
             if filled is not None:
@@ -189,8 +201,7 @@ def _form(
     study: StudyRow | None = None,
 ) -> Response:
     begun = form_reader.begun(kind, typed)
-    chosen = machines.find_machine(session, begun.get("machine", ""))
-    usable = characteristics.characteristics(session, machine_id=chosen.id if chosen else None, limit=100_000)
+    usable = characteristics.characteristics(session, limit=100_000)
     return page(
         request,
         "gauge_studies/form.html",
@@ -203,7 +214,10 @@ def _form(
         study=study,
         machines=[(machine.key, machine.name) for machine in machines.machines(session, limit=100_000)],
         characteristics=[("", _("none"))]
-        + [(row.characteristic.key, f"{row.characteristic.key} – {row.characteristic.name}") for row in usable],
+        + [
+            (row.characteristic.key, f"{row.characteristic.key} – {row.characteristic.name}, {row.machine.name}")
+            for row in usable
+        ],
         heading=form_reader.heading,
         wording=wording,
     )

@@ -52,6 +52,17 @@ class TestTyped:
         assert [verdict["limit"] for verdict in study["verdicts"][:2]] == [limit, limit]
         assert limit in operator.open(f"/gauges?characteristic={shop.characteristic}")
 
+    def test_the_machine_is_that_of_the_characteristic(self, shop: Shop, operator: Person) -> None:
+        other = Shop(shop.server)
+        chosen = form(shop, "type_one", machine=other.machine, do="grid", reference="", tolerance="")
+        page = operator.send("/gauges/new", 200, **chosen)
+        assert f'value="{shop.characteristic}" selected' in page, "it is not lost"
+        assert f'value="{shop.machine}" selected' in page
+        assert (cell(page, "tolerance"), cell(page, "reference")) == ("0.016", "40")
+        cells = {f"c_{n // 10}_{n % 10}": f"40,000{n % 3}" for n in range(30)}
+        operator.send("/gauges/new", 200, **form(shop, "type_one", machine=other.machine, **cells))
+        assert newest(shop)["characteristic"] == shop.characteristic
+
     def test_what_is_wrong_is_named_and_what_was_typed_stays(self, shop: Shop, operator: Person) -> None:
         cells = {"c_0_0": "40,1", "c_0_1": "forty", "c_0_2": "40,2", "name_0": "Šipka “1”", "c_0_4": "40,3"}
         page = operator.send("/gauges/new", 422, **form(shop, "grr", **cells))
