@@ -314,6 +314,8 @@ def _mean_size(session: Session, past: ToolHistory, but: Whole) -> float | None:
 
 
 def _likeness(past: ToolHistory, truly: Figures, then: Figures, result: ReplayResult) -> Likeness:
+    if past.imported:
+        return Likeness(then, None, None, "unknown")  # no loop was at work that the replay could be like
     counted = ~past.history.excluded & past.inner(past.history["deviation"])
     off, same = agreement(result.deviation[past.mine][counted], past.history["deviation"][counted])
     if not isfinite(off):

@@ -2,10 +2,11 @@
 
 A tool that several characteristics correct is replayed with all of them: each keeps deciding as it did, and only the
 one that is asked about gets other settings. Readings that nobody knows the corrections of (cut before a tool change,
-imported, or from before that was kept) are left out, and counted.
+imported, or from before that was kept) are left out, and counted. Where all that are known were imported, they are a process
+that this loop never corrected, and are replayed as that.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from functools import cached_property
 from typing import Any, NamedTuple
@@ -20,13 +21,14 @@ from app.core.decision.loops import Mark, ProcessTrace
 from app.core.decision.step import (
     FIRST_MOVE_TRIGGERED,
     IMPLAUSIBLE,
+    IMPORTED,
     OFFSET_BY_HAND,
     REJECTED,
     TOOL_WORN_HELD,
     TOUCH_FAULT,
     rounded,
 )
-from app.core.parameters import Parameters
+from app.core.parameters import Mode, Parameters
 from app.core.period import Period
 from app.core.replay import LONGEST_DELAY, Figures, Policy, ReplayedCharacteristic, parts_of, rebuilt
 from app.core.spc.resolution import resolution_of
@@ -79,6 +81,7 @@ class ToolHistory:
     then: each version as it was in force. unknown: readings left out. others: characteristics that correct the same tool.
     delays: parts between a correction and its effect; None where no correction has taken effect.
     compensated: of every reading of `trace`, mm of offset; factors: what its characteristic turns mm of size into mm of offset by.
+    imported: they come from files, and none of them was corrected by this loop.
     of_tool: corrections of the tool, those of the others included. baseline: version of the one in force, if it is one of deviations.
     """
 
@@ -97,6 +100,7 @@ class ToolHistory:
     others: list[str]
     delays: Delays | None
     baseline: int | None
+    imported: bool = False
 
     @property
     def delay(self) -> int | None:
@@ -118,8 +122,11 @@ class ToolHistory:
         return Policy(lanes, delay)
 
     def as_then(self, delay: int, effect: float = 1.0) -> Policy:
-        """As it was set then."""
-        return Policy(tuple(replace_lane(lane, effect, lane.parameters, None) for lane in self.then.lanes), delay)
+        """As it was set then; of imported readings, which nobody corrected, nothing but measured."""
+        lanes = tuple(replace_lane(lane, effect, lane.parameters, None) for lane in self.then.lanes)
+        if self.imported:
+            lanes = tuple(lane._replace(parameters=replace(lane.parameters, mode=Mode.MEASURE_ONLY)) for lane in lanes)
+        return Policy(lanes, delay)
 
     def inner(self, deviations: Values) -> Flags:
         """Tell which deviations (mm) lie within R37 of today."""
@@ -193,6 +200,9 @@ def past_of(session: Session, current: CurrentCharacteristic, window: Window) ->
     columns = (*COLUMNS, "part") if others else COLUMNS
     whole = statistics.history_of(session, current.characteristic, window, columns)
     own = whole.only(np.isfinite(whole["compensated"]))
+    if not len(own) and len(imported := whole.only(whole["code"] == IMPORTED)):
+        found = _joined(session, current, window, [(current, _uncorrected(imported))], len(whole) - len(imported))
+        return replace(found, imported=True)
     histories = [(current, own)]
     if len(own):
         began, ended = (_moment(moment) for moment in (own["measured_at"].min(), own["measured_at"].max()))
@@ -203,6 +213,13 @@ def past_of(session: Session, current: CurrentCharacteristic, window: Window) ->
             history = statistics.history_of(session, other.characteristic, span, columns)
             histories.append((other, history.only(np.isfinite(history["compensated"]))))
     return _joined(session, current, window, histories, len(whole) - len(own))
+
+
+def _uncorrected(imported: History) -> History:
+    """Readings of files in the order in which they were measured, with no correction in any of them."""
+    ordered = imported.only(np.argsort(imported["measured_at"], kind="stable"))
+    known = {"compensated": np.zeros(len(ordered)), "received_at": ordered["measured_at"]}
+    return History(ordered.columns | known, ordered.excluded)
 
 
 def _others(session: Session, current: CurrentCharacteristic) -> list[CurrentCharacteristic]:

@@ -109,6 +109,12 @@ def cautions(past: ToolHistory) -> list[str]:
     cautions: list[str] = []
     if parameters.measures_only:
         cautions.append(_("This characteristic only measures: no settings make a difference."))
+    if past.imported:
+        cautions.append(
+            _(
+                "These readings were imported. They are replayed as parts of a process without corrections: what was corrected by hand then is not known."
+            )
+        )
     if past.unknown:
         cautions.append(
             ngettext(

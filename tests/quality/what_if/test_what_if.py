@@ -2,6 +2,7 @@
 
 from concurrent.futures import ThreadPoolExecutor
 from datetime import UTC, datetime
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -9,6 +10,7 @@ import pytest
 
 from app.quality.what_if.tool_history import Delays, _delays
 from tests.conftest import Server
+from tests.loop.readings.importing.test_history import run, table
 from tests.quality.closed_loop import cut, scatter
 from tests.quality.control_charts.rows import frozen
 from tests.shop import Person, Shop
@@ -355,3 +357,20 @@ def test_the_figure_draws_both_courses(ran: Shop) -> None:
     assert courses[0]["y"] == pytest.approx([each["deviation"] * 1000 for each in truth], abs=0.001)
     as_today = ran.call("GET", f"/characteristics/{ran.characteristic}/figures/what-if")
     assert [each["name"] for each in as_today["data"] if each["meta"] == "course"] == ["Current settings"]
+
+
+def test_an_imported_history_is_replayed_as_a_process_without_corrections(
+    shop: Shop, viewer: Person, tmp_path: Path
+) -> None:
+    sizes = [round(40 + deviation / 1000, 6) for deviation in scatter(120, wear=0.1)]
+    newer = table(tmp_path / "newer.csv", sizes[60:], begin="2026-03-02T07:00:00+01:00")
+    run(shop.server.database, newer, shop.characteristic)
+    run(shop.server.database, table(tmp_path / "older.csv", sizes[:60]), shop.characteristic)
+    found = ask(shop)
+    assert found["readings"] == 120
+    assert found["truly"]["corrections"] == 0
+    assert found["truly"]["mean"] == pytest.approx(0.006, abs=0.0005), "the edge recedes by 12 µm"
+    assert found["today"]["corrections"] > 0
+    assert abs(found["today"]["mean"]) < 0.002, "the loop follows it, in the order in which the parts were cut"
+    assert found["likeness"]["verdict"] == "unknown"
+    assert "process without corrections" in viewer.open(f"/characteristics/{shop.characteristic}/what-if?last=all")

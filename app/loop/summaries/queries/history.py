@@ -77,8 +77,8 @@ class History:
         """Without the excluded readings."""
         return self.only(~self.excluded) if self.excluded.any() else self
 
-    def only(self, wanted: NDArray[np.bool_]) -> "History":
-        """Those readings for which `wanted` is True."""
+    def only(self, wanted: NDArray[np.bool_] | NDArray[np.int64]) -> "History":
+        """Those readings for which `wanted` is True; or those at these places, in this order."""
         return History({name: values[wanted] for name, values in self.columns.items()}, self.excluded[wanted])
 
 
