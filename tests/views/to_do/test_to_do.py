@@ -38,8 +38,7 @@ def kinds(text: str) -> list[str]:
 def test_the_count_is_the_length_of_the_list_wherever_it_stands(waits: Shop, operator: Person) -> None:
     page = operator.open("/todo")
     assert kinds(page) == ["alarm", "correction", "proposal"], "a held correction belongs to its alarm"
-    assert counted(page) == counted(operator.open("/todo/count")) == counted(operator.open("/alarms")) == 3
-    assert "<strong>3</strong> to do" in operator.open("/")
+    assert counted(page) == counted(operator.open("/todo/count")) == counted(operator.open("/")) == 3
 
 
 def test_by_machine_and_by_role(
@@ -128,11 +127,8 @@ def test_the_count_in_the_bar_follows_proposals(page: Page, waits: Shop, enginee
         "POST", f"/characteristics/{waits.characteristic}/proposals", 201, zero_range=0.003, reason="Few"
     )
     expect(page.get_by_role("link", name=f"All {before + 1}")).to_be_visible()
-    page.goto("/")
-    expect(page.locator("live-status")).to_have_attribute("state", "live")
-    expect(page.locator("#plant-summary a")).to_have_attribute("data-count", str(before + 1))
     waits.call("POST", f"/proposals/{again['id']}/reject", reason="Too wide")
-    expect(page.locator("#plant-summary a")).to_have_attribute("data-count", str(before))
+    expect(page.get_by_role("link", name=f"All {before}")).to_be_visible()
 
 
 @pytest.mark.browser
