@@ -1,10 +1,10 @@
-// <copy-text for="ID" done="Copied" failed="…"><button type="button" hidden>…</button></copy-text>: copies the text of a textarea.
+// <copy-text for="ID" done="Copied" failed="…"><button type="button" hidden>…</button></copy-text>: copies the text of a textarea or of another element.
 //
-//   for       the id of the textarea
+//   for       the id of the element
 //   done      what the button says for two seconds afterwards
 //   failed    what it says where the browser does not let pages copy; the text is selected then, for Ctrl+C
 //
-// Without script the button stays hidden; the textarea can be selected and copied by hand all the same.
+// Without script the button stays hidden; the text can be selected and copied by hand all the same.
 
 class CopyText extends HTMLElement {
   connectedCallback() {
@@ -26,7 +26,7 @@ class CopyText extends HTMLElement {
     let copied = true;
     try {
       // Only pages from https or the own computer may use the clipboard this way; a shop floor often has neither.
-      if (navigator.clipboard) await navigator.clipboard.writeText(area.value);
+      if (navigator.clipboard) await navigator.clipboard.writeText(area.value ?? area.textContent);
       else copied = this.select(area) && document.execCommand("copy");
     } catch {
       copied = false;
@@ -36,8 +36,10 @@ class CopyText extends HTMLElement {
   }
 
   select(area) {
-    area.focus();
-    area.select();
+    if (area.select) {
+      area.focus();
+      area.select();
+    } else getSelection().selectAllChildren(area);
     return true;
   }
 
