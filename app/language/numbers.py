@@ -136,6 +136,15 @@ def mm(size_mm: float | None, decimals: int = 4) -> str:
     return NOTHING if size_mm is None else f"{fixed(size_mm, decimals)}{NO_BREAK_SPACE}mm"
 
 
+def grouped(count: int) -> str:
+    """A count as people read it.
+
+    >>> grouped(9287)
+    '9\u202f287'
+    """
+    return f"{count:,}".replace(",", "\N{NARROW NO-BREAK SPACE}")
+
+
 def percent(share: float | None, decimals: int = 0) -> str:
     r"""A share of 1 in per cent; what is less than all is not rounded to 100, nor what is more than nothing to 0.
 
@@ -173,17 +182,21 @@ def typed_length(length_mm: float) -> str:
     return f"{length_mm:.9f}".rstrip("0").ljust(len(f"{length_mm:.4f}"), "0")
 
 
-def when(moment: datetime | None, style: str = "seconds") -> Markup:
-    """A moment in the time zone of the plant, which the foot of the page names. Style: `seconds`, `minutes` or `date`."""
-    if moment is None:
-        return Markup("–")
+def as_read(moment: datetime, style: str = "seconds") -> str:
+    """A moment in the time zone of the plant, as people read it. Style: `seconds`, `minutes` or `date`."""
     there = local(moment)
     pattern = {"seconds": "d MMM y HH:mm:ss", "minutes": "d MMM y HH:mm", "date": "d MMM y"}[style]
     text = format_datetime(there, pattern, tzinfo=plant_zone(), locale=current_locale())
-    if style != "date" and is_twice(there):
-        text += f" {offset(there)}"
+    return f"{text} {offset(there)}" if style != "date" and is_twice(there) else text
+
+
+def when(moment: datetime | None, style: str = "seconds") -> Markup:
+    """The same on a page, where the zone is said when it is pointed at."""
+    if moment is None:
+        return Markup("–")
+    there = local(moment)
     title = f"{plant_zone().key}, {offset(there)}"
-    return Markup('<time datetime="{}" title="{}">{}</time>').format(there.isoformat(), title, text)
+    return Markup('<time datetime="{}" title="{}">{}</time>').format(there.isoformat(), title, as_read(moment, style))
 
 
 def age(seconds: float) -> str:

@@ -12,9 +12,16 @@ from app.views.compare.series import SeriesBy, compared
 from app.web.api import FIGURE, Theme, Width, api_router, chart_answer, problems
 from app.web.choice import Chosen
 from app.web.deps import FROM_REPLICA, SessionDep
+from app.web.fields import Moment
 
 router = api_router("statistics", FROM_REPLICA)
 Of = Annotated[list[str], Query(max_length=12, description="Characteristics.", examples=["shaft-d40"])]
+Tools = Annotated[
+    list[Moment] | None,
+    Query(
+        max_length=24, description="By tool: those that were changed in at these moments; the last four if left out."
+    ),
+]
 ByQuery = Annotated[SeriesBy, Query(description="What differs: characteristics, or versions, tools, periods of each.")]
 
 
@@ -24,6 +31,7 @@ def get_comparison(
     of: Of,
     choice: Chosen,
     by: ByQuery = SeriesBy.CHARACTERISTIC,
+    tool: Tools = None,
     overlaid: Annotated[bool, Query(description="All in one panel, in place of one above the other.")] = False,
     of_tolerance: Annotated[bool, Query(description="As a share of half the tolerance, in place of µm.")] = False,
     own_scale: Annotated[bool, Query(description="Each panel reaches as far as its own readings.")] = False,
@@ -32,7 +40,7 @@ def get_comparison(
 ) -> Response:
     """Readings of several characteristics, or of several versions, tools or periods, on one scale."""
     in_time = by is SeriesBy.CHARACTERISTIC
-    series = compared(session, of, by, choice)
+    series = compared(session, of, by, choice, tool or ())
     courses = [course_of(session, each, in_time=in_time) for each in series]
     figure = compare_figure(courses, overlaid=overlaid, of_tolerance=of_tolerance, own_scale=own_scale)
     events = [event for each in series for event in events_of(session, each, figure, in_time=in_time)]

@@ -2,20 +2,18 @@
 
 from collections.abc import Iterator
 from dataclasses import replace
-from datetime import UTC, datetime
 from typing import NamedTuple
 
 from sqlalchemy.orm import Session
 
 from app.charts import Chart
 from app.core.decision.limits import Zone
-from app.core.period import Period
 from app.loop.summaries import queries as statistics
 from app.loop.summaries.queries import Numbers
 from app.loop.timeline import queries as timeline
 from app.loop.timeline.figures import Event, span_of
 from app.quality.capability.queries import Judgement, judgement_of
-from app.views.characteristic.chart import reading_link
+from app.views.characteristic.chart_corrections import reading_link
 from app.views.compare.figures import Course
 from app.views.compare.series import Compared
 
@@ -48,7 +46,9 @@ def course_of(session: Session, compared: Compared, *, in_time: bool) -> Course:
         for one in readings:
             yield one.sequence - window.first + 1
 
-    moments = [block.first_at for block, _mean in blocks] + [one.measured_at for one in readings]
+    moments = [block.first_at + (block.last_at - block.first_at) / 2 for block, _mean in blocks] + [
+        one.measured_at for one in readings
+    ]
     deviations = [one.deviation for one in readings]
     means: list[float | None] = [mean.value for _block, mean in blocks]
     return Course(
@@ -71,8 +71,7 @@ def events_of(session: Session, compared: Compared, chart: Chart, *, in_time: bo
     if span is None or not window.count:
         return []
     if in_time:
-        start, end = (datetime.fromtimestamp(end, UTC) for end in span)
-        events = timeline.events_in(session, current, Period.through(start, end))
+        events = timeline.events_over_time(session, current, window.first, window.last)
     else:
         events = [
             replace(event, at=event.at - window.first + 1)

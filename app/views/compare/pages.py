@@ -11,9 +11,10 @@ from app.language.i18n import _
 from app.loop.characteristics import queries as characteristics
 from app.quality.capability import wording as capability
 from app.views.compare.chart import row_of
-from app.views.compare.series import MOST, SeriesBy, compared
+from app.views.compare.series import MOST, SeriesBy, compared, tools_of
 from app.web.choice import ChosenOnPage
 from app.web.deps import FROM_REPLICA, SessionDep
+from app.web.fields import Moment
 from app.web.paging import address
 from app.web.templates import page
 
@@ -27,6 +28,7 @@ def compare_page(
     choice: ChosenOnPage,
     of: Annotated[list[str] | None, Query(max_length=12)] = None,
     by: SeriesBy = SeriesBy.CHARACTERISTIC,
+    tool: Annotated[list[Moment] | None, Query(max_length=24)] = None,
     overlaid: bool = False,
     of_tolerance: bool = False,
     own_scale: bool = False,
@@ -34,13 +36,18 @@ def compare_page(
     """Choose what to compare, see it on one scale, with the statistics of each."""
     keys = list(dict.fromkeys(of or []))
     problem: InbandError | None = None
-    rows = []
+    rows, tools = [], []
     try:
-        rows = [row_of(session, each) for each in compared(session, keys, by, choice)]
+        rows = [row_of(session, each) for each in compared(session, keys, by, choice, tool or ())]
+        if by is SeriesBy.TOOL:
+            currents = (characteristics.characteristic_named(session, key) for key in keys)
+            tools = [each for current in currents for each in tools_of(session, current)]
     except InbandError as error:
         problem = error
     how = {"by": by.value, "overlaid": overlaid, "of_tolerance": of_tolerance, "own_scale": own_scale}
-    said = {name: "true" if value is True else value for name, value in how.items() if value}
+    said: dict[str, object] = {name: "true" if value is True else value for name, value in how.items() if value}
+    if by is SeriesBy.TOOL:
+        said["tool"] = [at.isoformat() for at in tool or ()]
     period = choice.query
 
     def link(**changes: object) -> str:
@@ -57,6 +64,7 @@ def compare_page(
         rows=rows,
         keys=keys,
         by=by.value,
+        tools=[(each, any(each == row.compared for row in rows)) for each in tools],
         bys=[
             (SeriesBy.CHARACTERISTIC.value, _("Characteristics")),
             (SeriesBy.VERSION.value, _("Versions of the parameters")),

@@ -1,16 +1,18 @@
 """The series that are compared: a characteristic and a run of its readings each. Never writes."""
 
+from collections.abc import Sequence
 from datetime import UTC, datetime
 from enum import StrEnum
 from typing import NamedTuple
 
-from sqlalchemy import select
+from sqlalchemy import ColumnElement, select
 from sqlalchemy.orm import Session
 
 from app.core.period import Period
 from app.errors import Invalid
 from app.language.i18n import _
-from app.language.times import MINUTES, local, written
+from app.language.numbers import as_read
+from app.language.times import local
 from app.loop.characteristics import queries as characteristics
 from app.loop.characteristics.queries import CurrentCharacteristic
 from app.loop.summaries import queries as statistics
@@ -35,22 +37,30 @@ class SeriesBy(StrEnum):
 
 
 class Compared(NamedTuple):
-    """One series: its name, and the readings of a characteristic."""
+    """One series: its name, and the readings of a characteristic. began_at: of a tool, when it was changed in."""
 
     name: str
     current: CurrentCharacteristic
     window: Window
+    began_at: datetime | None = None
 
 
-def compared(session: Session, keys: list[str], by: SeriesBy, choice: Choice) -> list[Compared]:
-    """The series, the older ones of a characteristic first. Raises `NotFound`, and `Invalid` for more than fit on a page."""
+def compared(
+    session: Session, keys: list[str], by: SeriesBy, choice: Choice, tools: Sequence[datetime] = ()
+) -> list[Compared]:
+    """The series, the older ones of a characteristic first. tools: of the tools those that were changed in at these moments.
+
+    Raises `NotFound`, and `Invalid` for more than fit on a page.
+    """
     found: list[Compared] = []
     for key in dict.fromkeys(keys):
         current = characteristics.characteristic_named(session, key)
+        if by is SeriesBy.TOOL:
+            found += _by_tool(session, current, tools)
+            continue
         found += {
             SeriesBy.CHARACTERISTIC: _alone,
             SeriesBy.VERSION: _by_version,
-            SeriesBy.TOOL: _by_tool,
             SeriesBy.PERIOD: _by_period,
         }[by](session, current, choice)
     if len(found) > MOST:
@@ -80,40 +90,64 @@ def _by_version(session: Session, current: CurrentCharacteristic, _choice: Choic
 
 
 def _first_judged_by(session: Session, version: ParametersVersion, newest: int) -> int:
-    """Number of the first reading judged by this version or a later one; by halves, for versions only ever follow."""
+    """Number of the first reading judged by this version or a later one; versions only ever follow."""
+    of = (version.machine_id, version.characteristic_id)
+    return _first_that(session, Reading.parameters_version >= version.version, *of, newest)
+
+
+def _first_that(
+    session: Session, holds: ColumnElement[bool], machine_id: int, characteristic_id: int, newest: int
+) -> int:
+    """Number of the first reading of which it holds, newest + 1 if of none; by halves, for it holds of all that follow."""
     low, high = 1, newest + 1
     while low < high:
         middle = (low + high) // 2
-        by = session.scalar(
-            select(Reading.parameters_version).where(
-                Reading.machine_id == version.machine_id,
-                Reading.characteristic_id == version.characteristic_id,
+        found = session.scalar(
+            select(holds).where(
+                Reading.machine_id == machine_id,
+                Reading.characteristic_id == characteristic_id,
                 Reading.sequence == middle,
             )
         )
-        low, high = (low, middle) if by is None or by >= version.version else (middle + 1, high)
+        low, high = (middle + 1, high) if found is False else (low, middle)
     return low
 
 
-def _by_tool(session: Session, current: CurrentCharacteristic, _choice: Choice) -> list[Compared]:
-    """The last tools in its location, each from tool change to tool change."""
+def tools_of(session: Session, current: CurrentCharacteristic) -> list[Compared]:
+    """The tools in its location that cut readings, the present one first, each from tool change to tool change.
+
+    A reading belongs to the tool that was in when it arrived: one that came late was cut before, and so was what came with it.
+    """
     number = current.parameters.tool_memory
     if not number:
         return []
-    return [
-        Compared(
-            f"{current.characteristic.name}, {_life(life)}",
-            current,
-            statistics.window_of(session, current.characteristic, period=Period(life.began_at, life.ended_at)),
-        )
-        for life in lives(session, current.machine, number).lives[:MOST_EACH][::-1]
-    ]
+    machine_id, characteristic_id = current.machine.id, current.characteristic.id
+    newest = statistics.window_of(session, current.characteristic).newest
+    last, found = newest, []
+    for life in lives(session, current.machine, number).lives:
+        if life.ended_at is None:
+            first = statistics.since_tool_change(session, current.characteristic).first
+        elif life.began_at is None:
+            first = 1
+        else:
+            first = _first_that(session, Reading.received_at >= life.began_at, machine_id, characteristic_id, newest)
+        if first <= last:
+            name = f"{current.characteristic.name}, {_life(life)}"
+            found.append(Compared(name, current, Window(first, last, newest), life.began_at))
+            last = first - 1
+    return found
+
+
+def _by_tool(session: Session, current: CurrentCharacteristic, chosen: Sequence[datetime]) -> list[Compared]:
+    """The chosen tools; the last ones if none of them is of this location."""
+    known = tools_of(session, current)
+    return ([each for each in known if each.began_at in chosen] or known[:MOST_EACH])[::-1]
 
 
 def _life(life: Life) -> str:
     if life.began_at is None:
         return _("first tool") if life.ended_at else _("tool")
-    return _("tool of {since}").format(since=written(life.began_at, MINUTES))
+    return _("tool of {since}").format(since=as_read(life.began_at, "minutes"))
 
 
 def begin_before(start: datetime, end: datetime) -> datetime:

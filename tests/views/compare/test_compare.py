@@ -1,5 +1,6 @@
 """Compared series: over the API and on the page."""
 
+import re
 from datetime import UTC, datetime, timedelta
 from html import unescape
 from urllib.parse import urlencode
@@ -77,3 +78,34 @@ def test_the_statistics_of_each_stand_below(viewer: Person, compared: Shop) -> N
     assert "−1.50" in text  # of version 2
     assert "nobody" in viewer.open("/compare?of=nobody", 404)
     assert "Nothing to compare yet" in viewer.open("/compare")
+
+
+def test_the_pages_own_button_compares_with_nothing_added(viewer: Person, compared: Shop) -> None:
+    one = compared.characteristic
+    text = unescape(viewer.open(f"/compare?of={one}&of=&by=tool"))
+    assert "There is no characteristic" not in text
+    assert text.count(f"Seat {one}, tool of ") == 3, "in the table, as a box to tick, and its name in no other way"
+    problem = viewer.open("/compare?of=nobody", 404)
+    assert "Check the key." in problem
+    assert "/api/v1/characteristics" not in problem.split("<footer")[0], "no page tells a person to call the API"
+
+
+def test_tools_are_chosen_and_cut_where_their_readings_arrived(compared: Shop, viewer: Person) -> None:
+    """The parts were measured three weeks ago; the tools were changed as the readings came in."""
+    key = compared.another("by-tool")
+    begin = datetime(2026, 11, 2, 6, tzinfo=UTC)
+    changes = []
+    for life in range(3):
+        moments = [(begin + timedelta(days=life, hours=hour)).isoformat() for hour in range(2)]
+        compared.push([life + 1.0, life + 1.5], key, measured_at=moments)
+        if life < 2:
+            compared.call("POST", f"/machines/{compared.machine}/tools/3/change", offset=0, reason="new insert")
+            changes.append(compared.call("GET", f"/machines/{compared.machine}/tools/3/lives")["lives"][0]["began_at"])
+    assert series(compared, f"of={key}&by=tool") == [[1, 1.5], [2, 2.5], [3, 3.5]]
+    assert series(compared, urlencode({"of": key, "by": "tool", "tool": changes[0]})) == [[2, 2.5]]
+    page = unescape(viewer.open("/compare?" + urlencode({"of": key, "by": "tool", "tool": changes[1]})))
+    boxes = re.findall(r'<input type="checkbox" name="tool" value="([^"]+)"( checked)?>', page)
+    assert [(datetime.fromisoformat(at), bool(checked)) for at, checked in boxes] == [
+        (datetime.fromisoformat(changes[1]), True),
+        (datetime.fromisoformat(changes[0]), False),
+    ]
