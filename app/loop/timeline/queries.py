@@ -1,6 +1,7 @@
 """Events of a machine or of a characteristic, put on its charts. Never writes."""
 
 from bisect import bisect_right
+from collections import Counter
 from collections.abc import Collection, Iterator
 from dataclasses import replace
 from datetime import UTC, datetime
@@ -15,6 +16,7 @@ from app.charts import Chart
 from app.core.period import Period
 from app.db.period import in_period
 from app.language.i18n import _
+from app.language.numbers import grouped
 from app.loop.alarms.kinds import kind_named
 from app.loop.characteristics.queries import CurrentCharacteristic
 from app.loop.notes.queries import on_charts_of
@@ -33,17 +35,24 @@ MOST_MOMENTS = 600  # readings whose moments say between which of them an event 
 
 
 def with_events(
-    session: Session, current: CurrentCharacteristic, chart: Chart, width: int = 1240, *, lines: bool = True
+    session: Session,
+    current: CurrentCharacteristic,
+    chart: Chart,
+    width: int = 1240,
+    *,
+    lines: bool = True,
+    over: tuple[int, int] | None = None,
 ) -> Chart:
-    """A chart over the readings of a characteristic, or over time, with the events of the characteristic above it.
+    """A chart over the readings of a characteristic with the events of the characteristic above it.
 
-    width: in pixels, about. lines: upward at what somebody changed; without them where the chart draws its own.
+    width: in pixels, about. lines: upward at what somebody changed; without them where the chart draws its own. over: numbers of
+    the first and the last reading of a chart over time.
     """
     span = span_of(chart)
     if span is None:
         return chart
-    if chart.x.kind == "time":
-        events = events_in(session, current, _period(span))
+    if over is not None:
+        events = events_over_time(session, current, *over)
     else:
         events = events_by_reading(session, current, ceil(span[0]), floor(span[1]))
     return with_lane(chart, events, width, lines=lines)
@@ -92,9 +101,15 @@ def _period(span: tuple[float, float]) -> Period:
     return Period.through(*(datetime.fromtimestamp(end, UTC) for end in span))
 
 
-def events_in(session: Session, current: CurrentCharacteristic, period: Period) -> list[Event]:
-    """Events of a characteristic, of its tool and of its empirical value, each at its moment."""
-    return [each.event for each in _of_characteristic(session, current, period)]
+def events_over_time(session: Session, current: CurrentCharacteristic, first: int, last: int) -> list[Event]:
+    """Events of a characteristic, of its tool and of its empirical value over these readings, each at its moment.
+
+    Where readings came late, from a bridge that was offline or from a file, the server knew of an event long after the parts had
+    been measured: it stands at the reading that it belongs to.
+    """
+    placed = _placed(session, current, first, last)
+    measured = {one.sequence: one.measured_at for one in _moments(session, current, {each.reading for each in placed})}
+    return [replace(each.event, at=measured.get(each.reading or 0) or each.late or each.event.at) for each in placed]
 
 
 def events_by_reading(session: Session, current: CurrentCharacteristic, first: int, last: int) -> list[Event]:
@@ -103,41 +118,75 @@ def events_by_reading(session: Session, current: CurrentCharacteristic, first: i
     What came after the newest reading is at the number that the next one will have. Of very many readings the place is
     exact to as much as a chart can show.
     """
+    return [replace(each.event, at=each.reading or each.next) for each in _placed(session, current, first, last)]
+
+
+class _Placed(NamedTuple):
+    """An event among readings. reading: the one that it belongs to, if it names one; next: the first that came after it.
+
+    late: when that was measured, if it was measured before the server knew of the event.
+    """
+
+    event: Event
+    reading: int | None
+    next: int
+    late: datetime | None
+
+
+def _placed(session: Session, current: CurrentCharacteristic, first: int, last: int) -> list[_Placed]:
     newest = session.scalar(
         select(Stream.sequence).where(
             Stream.machine_id == current.machine.id, Stream.characteristic_id == current.characteristic.id
         )
     )
     first, last = max(1, first), min(last, newest or 0)
-    moments = _moments(session, current, first, last)
-    if not moments:
-        return []
-    before, after = _moments(session, current, first - 1, first - 1), _moments(session, current, last + 1, last + 1)
-    period = Period((before or moments)[0][1], after[0][1] if after else None)
-    arrivals = [at for _sequence, at in moments]
-    numbers = [sequence for sequence, _at in moments] + ([] if after else [last + 1])
-    events = []
-    for event, sequence, arrived in _of_characteristic(session, current, period, (first, last)):
-        place = bisect_right(arrivals, arrived)
-        at = sequence or (numbers[place] if place < len(numbers) else None)
-        if at is not None and first <= at <= last + 1:
-            events.append(replace(event, at=at))
-    return events
-
-
-def _moments(session: Session, current: CurrentCharacteristic, first: int, last: int) -> list[tuple[int, datetime]]:
-    """Readings from first to last, evenly spread, with the moments at which they arrived."""
     stride = max(1, -(-(last - first + 1) // MOST_MOMENTS))
+    moments = _moments(session, current, {*range(first, last, stride), last})
+    if last < first or not moments:
+        return []
+    before, after = _moments(session, current, {first - 1}), _moments(session, current, {last + 1})
+    period = Period((before or moments)[0].received_at, after[0].received_at if after else None)
+    arrivals = [one.received_at for one in moments]
+    happened = _of_characteristic(session, current, period, (first, last))
+    placed = []
+    if max(Counter(each.event.is_alarm or each.event.kind for each in happened).values(), default=0) >= MOST:
+        words = _("of each kind of event the newest {n}").format(n=grouped(MOST))
+        placed.append(_Placed(Event(moments[0].measured_at, NOTE, words), None, first, None))
+    for event, sequence, arrived in happened:
+        place = bisect_right(arrivals, arrived)
+        coming = moments[place] if place < len(moments) else None
+        at = sequence or (coming.sequence if coming else None if after else last + 1)
+        if at is None or not first <= at <= last + 1:
+            continue
+        past = moments[place - 1 : place] if place else before
+        # Where the next one is older than the one before, somebody has imported the past: the event is none of it.
+        in_order = coming is not None and (not past or past[0].measured_at <= coming.measured_at)
+        late = coming.measured_at if coming and in_order and event.at == arrived > coming.measured_at else None
+        placed.append(_Placed(event, sequence, at, late))
+    return placed
+
+
+class _Moment(NamedTuple):
+    sequence: int
+    received_at: datetime
+    measured_at: datetime
+
+
+def _moments(session: Session, current: CurrentCharacteristic, sequences: Collection[int | None]) -> list[_Moment]:
+    """Moments of these readings, ascending."""
+    asked = [sequence for sequence in sequences if sequence]
+    if not asked:
+        return []
     rows = session.execute(
-        select(Reading.sequence, Reading.received_at)
+        select(Reading.sequence, Reading.received_at, Reading.measured_at)
         .where(
             Reading.machine_id == current.machine.id,
             Reading.characteristic_id == current.characteristic.id,
-            Reading.sequence.in_([*range(first, last, stride), last]),
+            Reading.sequence.in_(asked),
         )
         .order_by(Reading.sequence)
     )
-    return [(sequence, at) for sequence, at in rows]
+    return [_Moment(*row) for row in rows]
 
 
 class _Happened(NamedTuple):
@@ -149,12 +198,10 @@ class _Happened(NamedTuple):
 
 
 def _of_characteristic(
-    session: Session, current: CurrentCharacteristic, period: Period, numbers: tuple[int, int] | None = None
+    session: Session, current: CurrentCharacteristic, period: Period, numbers: tuple[int, int]
 ) -> list[_Happened]:
     """Everything of the period. numbers: of the first and last reading; notes about one of them are found by its number."""
-    noted = in_period(Note.at, period)
-    if numbers is not None:
-        noted = or_(Note.sequence.is_(None) & noted, Note.sequence.between(*numbers))
+    noted = or_(Note.sequence.is_(None) & in_period(Note.at, period), Note.sequence.between(*numbers))
     machine, parameters = current.machine, current.parameters
     concerned = or_(
         Alarm.characteristic_id == current.characteristic.id,

@@ -6,6 +6,7 @@ from app.core.spc.false_alarms import LONGEST, FalseAlarms
 from app.core.spc.rules import RULES, RuleName
 from app.core.spc.shewhart import Chart
 from app.language.i18n import _, ngettext
+from app.language.numbers import grouped
 from app.loop.summaries import wording as statistics
 from app.quality.control_charts.monitoring import Do, Place, Rules
 from app.quality.control_charts.rules_queries import RuleTrial
@@ -62,18 +63,9 @@ def every(chance: FalseAlarms) -> str:
     if chance.every == float("inf"):
         return _("never")
     if chance.rarely:
-        return _("less than 1 in {points} points").format(points=count(round(LONGEST)))
-    text = _("1 in {points} points").format(points=count(round(chance.every)))
+        return _("less than 1 in {points} points").format(points=grouped(round(LONGEST)))
+    text = _("1 in {points} points").format(points=grouped(round(chance.every)))
     return text if chance.exact else _("about {text}").format(text=text)
-
-
-def count(number: int) -> str:
-    r"""A number with thin spaces between the thousands.
-
-    >>> count(14251)
-    '14\u202f251'
-    """
-    return f"{number:,}".replace(",", "\N{NARROW NO-BREAK SPACE}")
 
 
 def fired(tried: RuleTrial) -> str:
@@ -82,7 +74,7 @@ def fired(tried: RuleTrial) -> str:
         return _("no points")
     if not tried.signals:
         return _("never")
-    return ngettext("%(n)s time", "%(n)s times", tried.signals) % {"n": count(tried.signals)}
+    return ngettext("%(n)s time", "%(n)s times", tried.signals) % {"n": grouped(tried.signals)}
 
 
 def expected(tried: RuleTrial) -> str:
@@ -94,7 +86,7 @@ def expected(tried: RuleTrial) -> str:
     """
     number = tried.expected
     if number >= 9.5:
-        return count(round(number))
+        return grouped(round(number))
     return f"{number:.1f}" if number >= 0.05 else _("less than 0.1") if number else "0"
 
 
@@ -127,7 +119,7 @@ def summary(everything: RuleTrial) -> str:
         "happens, chance alone gives {expected}: {every}, on independent readings that are distributed normally."
     ).format(
         signals=signals(everything.signals),
-        points=count(everything.points),
+        points=grouped(everything.points),
         expected=expected(everything),
         every=every(everything.chance),
     )
@@ -135,7 +127,7 @@ def summary(everything: RuleTrial) -> str:
 
 def signals(number: int) -> str:
     """So many signals."""
-    return ngettext("%(n)s signal", "%(n)s signals", number) % {"n": count(number)}
+    return ngettext("%(n)s signal", "%(n)s signals", number) % {"n": grouped(number)}
 
 
 def why_more() -> str:

@@ -46,7 +46,7 @@ def get_zone_chart(
 ) -> Response:
     """The zone chart: readings in their zones, running average, corrections, tool changes, alarms and other events.
 
-    Of more readings than can be chart_answer, blocks with their extremes: no extreme is ever thinned away.
+    Of more readings than can be drawn, blocks with their extremes: no extreme is ever thinned away.
     """
     current, window = _found(session, caller, characteristic, choice)
     chart = chart_of(session, current, window)
@@ -63,6 +63,7 @@ def get_zone_chart(
             total_before=chart.total_before,
             width=width,
             ringed=ringed or ("newest" if window.reaches_now else None),
+            left_out=chart.left_out,
         ),
         theme,
     )
@@ -77,11 +78,15 @@ def get_run_chart(
     theme: Theme = "light",
     width: Width = 1240,
 ) -> Response:
-    """Sizes over time, corrected by the empirical value of each reading; of more than 2 000 readings the last 2 000."""
+    """Sizes over time, corrected by the empirical value of each reading.
+
+    Of more readings than can be drawn, blocks with their extremes: no extreme is ever thinned away.
+    """
     current, window = _found(session, caller, characteristic, choice)
-    points, sizes = run_of(session, current, window)
-    figure = run_figure(points, current.parameters, sizes=sizes)
-    return chart_answer(timeline.with_events(session, current, figure, width), theme)
+    run = run_of(session, current, window)
+    figure = run_figure(run.points, current.parameters, sizes=run.sizes, blocks=run.blocks)
+    over = window.first, window.last
+    return chart_answer(timeline.with_events(session, current, figure, width, over=over), theme)
 
 
 @router.get("/characteristics/{characteristic}/figures/results", responses=problems(404) | FIGURE, response_model=None)
@@ -98,7 +103,7 @@ def get_result_chart(
 ) -> Response:
     """Results of the measuring variant beside the value: run-out, out-of-roundness, taper, repeatability.
 
-    Of more readings than can be chart_answer, blocks with their extremes; of more than 500 000 the last ones.
+    Of more readings than can be drawn, blocks with their extremes; of more than 500 000 the last ones.
     """
     current, window = _found(session, caller, characteristic, choice)
     name: str = result or next(iter(yielded_by(current.parameters)), "repeat_range")
@@ -121,4 +126,5 @@ def get_histogram(
     current, window = _found(session, caller, characteristic, choice)
     parameters = current.parameters
     counts = statistics.histogram_of(session, current.characteristic, window, counting_edges(parameters))
-    return chart_answer(histogram_figure(counts, parameters), theme)
+    of = window.count if window.count > statistics.MOST_IN_HISTOGRAM else 0
+    return chart_answer(histogram_figure(counts, parameters, of=of), theme)

@@ -2,10 +2,12 @@
 
 import itertools
 from datetime import UTC, datetime, timedelta
+from pathlib import Path
 from typing import Any
 
 from app.charts import Axis, Chart, Panel, Series, svg, time_axis, to_drawing, to_plotly
 from app.loop.timeline.figures import CALIBRATION, PARAMETERS, TOOL_CHANGE, Event, with_lane
+from tests.loop.readings.importing.test_history import run, table
 from tests.shop import Shop
 
 GAUGE: dict[str, Any] = {
@@ -138,3 +140,26 @@ def test_an_alarm_of_another_location_stands_on_its_own_chart_only(shop: Shop) -
     assert "refused" not in words(other)
     assert "Oversize" in words(other)
     assert "refused" not in words(f"/characteristics/{shop.characteristic}/figures/zones"), "its R11 is 5"
+
+
+def test_events_of_readings_that_came_late_stand_at_their_reading(shop: Shop) -> None:
+    """A bridge was offline: three weeks later it sends what was measured then, and the server knows of all of it today."""
+    measured = [(START + timedelta(hours=at)).isoformat() for at in range(4)]
+    shop.read(0.1, measured_at=measured[0])
+    shop.read(12.5, measured_at=measured[1])
+    shop.call("POST", f"/machines/{shop.machine}/tools/3/change", offset=0.0, reason="new insert")
+    shop.read(0.2, measured_at=measured[2])
+    shop.read(0.3, measured_at=measured[3])
+    events = events_of(shop.call("GET", f"/characteristics/{shop.characteristic}/figures/run"))
+    placed = {words: datetime.fromisoformat(at) for at, words in zip(events["x"], said(events), strict=True)}
+    assert [at for words, at in placed.items() if "Oversize" in words] == [START + timedelta(hours=1)]
+    assert [at for words, at in placed.items() if "T3 changed" in words] == [START + timedelta(hours=2)]
+
+
+def test_an_event_of_today_is_none_of_a_past_that_is_imported_later(shop: Shop, tmp_path: Path) -> None:
+    shop.read(0.1)
+    shop.call("POST", f"/machines/{shop.machine}/tools/3/change", offset=0.0, reason="new insert")
+    run(shop.server.database, table(tmp_path / "a.csv", [40.0, 40.001]), shop.characteristic)
+    figure = shop.call("GET", f"/characteristics/{shop.characteristic}/figures/run")
+    (change,) = (at for at, words in zip(events_of(figure)["x"], said(events_of(figure)), strict=True) if "T3" in words)
+    assert datetime.fromisoformat(change) > START, "not in March, when the parts of the file were measured"

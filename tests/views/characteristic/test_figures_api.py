@@ -1,5 +1,6 @@
 """The figures over HTTP: every reading, every correction and every alarm is on them."""
 
+from datetime import UTC, datetime, timedelta
 from typing import Any
 
 import pytest
@@ -93,3 +94,18 @@ def test_nothing_measured_yet_is_said_so(shop: Shop) -> None:
 def test_a_wrong_choice_is_named(shop: Shop, query: dict[str, Any], field: str) -> None:
     problem = figure(shop, "zones", 422, **query)
     assert [error["field"] for error in problem["errors"]] == [field]
+
+
+def test_a_long_history_over_time_is_summed_up_and_nothing_is_left_out(shop: Shop) -> None:
+    begin = datetime(2026, 11, 2, 6, tzinfo=UTC)
+    deviations = [0.5 if at % 2 else -0.5 for at in range(2_600)]
+    deviations[3] = 7.5  # in the oldest of all blocks
+    shop.push(deviations, measured_at=[(begin + timedelta(minutes=at)).isoformat() for at in range(2_600)])
+    found = figure(shop, "run", last="all")
+    highest, newest = trace(found, "maximum"), trace(found, "run")
+    assert max(highest["y"]) == pytest.approx(40.0075)
+    assert datetime.fromisoformat(highest["x"][0]) < begin + timedelta(hours=1)
+    assert len(highest["x"]) * 32 + len(newest["x"]) == 2_600
+    assert "2\u202f600 readings, summed up by 32" in found["layout"]["xaxis"]["title"]["text"]
+    assert "summed up by 32" in figure(shop, "zones", last="all")["layout"]["xaxis"]["title"]["text"]
+    assert "summed up" not in figure(shop, "run", last=2_000)["layout"]["xaxis"]["title"]["text"]

@@ -50,6 +50,11 @@ class Block:
     def mean(self) -> float:
         return self.sum / self.count
 
+    @property
+    def middle_at(self) -> datetime:
+        """The middle of the time in which they were measured."""
+        return self.first_at + (self.last_at - self.first_at) / 2
+
 
 _COLUMNS = [getattr(ReadingSummary, name) for name in Block.__slots__]
 

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from datetime import datetime
 
 from app.charts import Dots, Faded, Pen, Series, band
 from app.core.decision.limits import Limits, classify
 from app.language.i18n import _
-from app.language.numbers import um
-from app.views.characteristic.figures.scale import Scale
+from app.language.numbers import grouped, um
 from app.web.theme import ZONE_SYMBOLS, zone_name, zone_role
 
 BETWEEN, EDGE = Faded("steady", 0.28), Faded("steady", 0.5)  # the smallest to the largest reading, and its edges
@@ -20,7 +20,7 @@ class Block:
     """Many readings in one: for charts of more than can be drawn. `link` opens its part of the chart; mm.
 
     minimum, maximum: of all of them. mean: without probe faults and excluded readings, of which there are `left_out`; None
-    where there are no others.
+    where there are no others. at: the middle of the time in which they were measured.
     """
 
     first: int
@@ -31,45 +31,70 @@ class Block:
     average: float | None = None
     link: str | None = None
     left_out: int = 0
+    at: datetime | None = None
 
     @property
     def middle(self) -> float:
         return (self.first + self.last) / 2
 
+    @property
+    def count(self) -> int:
+        return self.last - self.first + 1
 
-def envelope(blocks: Sequence[Block], ruler: Scale, edges: Limits) -> list[Series]:
-    """Smallest and largest reading of every block, filled between; extremes that need someone keep their shapes."""
+
+def summed_up(blocks: Sequence[Block], single: int) -> list[str]:
+    """Words for the axis of a chart of blocks and `single` readings: how many readings there are, and how many in a block."""
     if not blocks:
         return []
-    x = [block.middle for block in blocks]
+    count, most = single + sum(block.count for block in blocks), max(block.count for block in blocks)
+    return [_("{count} readings, summed up by {n}").format(count=grouped(count), n=grouped(most))]
+
+
+def envelope(
+    blocks: Sequence[Block],
+    position: Callable[[float], float],
+    edges: Limits,
+    *,
+    over_time: bool = False,
+    extremes: Sequence[Block] | None = None,
+) -> list[Series]:
+    """Smallest and largest reading of every block, filled between; extremes that need someone keep their shapes.
+
+    position: where a deviation (mm) is drawn. over_time: each block at its moment, not at its number. extremes: blocks whose
+    readings are not drawn besides; all if left out.
+    """
+    if not blocks:
+        return []
+    x = [block.at if over_time else block.middle for block in blocks]
     links = [block.link for block in blocks]
     said = [
         block_words(block.first, block.last, um(block.maximum), um(block.minimum), *_mean(block)) for block in blocks
     ]
-    means = [None if block.mean is None else ruler.position(block.mean) for block in blocks]
-    extremes = [
-        (block, value, zone)
-        for block in blocks
+    means = [None if block.mean is None else position(block.mean) for block in blocks]
+    alone = blocks if extremes is None else extremes
+    far = [
+        (block, place, value, zone)
+        for block, place in zip(blocks[: len(alone)], x, strict=False)
         for value in dict.fromkeys((block.minimum, block.maximum))
         if (zone := classify(value, edges)) not in {"zero", "average", "full"}
     ]
     marks = Series(
-        [block.middle for block, _value, _zone in extremes],
-        [ruler.position(value) for _block, value, _zone in extremes],
+        [place for _block, place, _value, _zone in far],
+        [position(value) for _block, _place, value, _zone in far],
         dots=Dots(
-            [ZONE_SYMBOLS[zone] for _block, _value, zone in extremes],
+            [ZONE_SYMBOLS[zone] for *_of, zone in far],
             9,
-            [zone_role(zone) for _block, _value, zone in extremes],
+            [zone_role(zone) for *_of, zone in far],
         ),
         meta="extremes",
-        hover=[f"<b>{um(value)}</b> · {zone_name(zone)}" for _block, value, zone in extremes],
-        links=[block.link for block, _value, _zone in extremes],
+        hover=[f"<b>{um(value)}</b> · {zone_name(zone)}" for _block, _place, value, zone in far],
+        links=[block.link for block, *_what in far],
     )
     return [
         *band(
             x,
-            [ruler.position(block.minimum) for block in blocks],
-            [ruler.position(block.maximum) for block in blocks],
+            [position(block.minimum) for block in blocks],
+            [position(block.maximum) for block in blocks],
             BETWEEN,
             metas=("minimum", "maximum"),
             pen=Pen(EDGE, 1, steps="hvh"),
@@ -77,8 +102,8 @@ def envelope(blocks: Sequence[Block], ruler: Scale, edges: Limits) -> list[Serie
             hover=said,
             links=links,
         ),
-        Series(x, means, Pen("average"), meta="mean", name=_("Mean"), hover=said, links=links),
-        *([marks] if extremes else []),
+        Series(x, means, Pen(Faded("average", 0.8), 1.25), meta="mean", name=_("Mean"), hover=said, links=links),
+        *([marks] if far else []),
     ]
 
 

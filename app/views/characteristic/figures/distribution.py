@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from datetime import datetime, timedelta
 
 import numpy as np
@@ -13,7 +13,8 @@ from app.charts import Axis, Bars, Chart, Dots, Note, Panel, Pen, Room, Rule, Se
 from app.core.decision.limits import HasLimits, Limits, in_nanometres
 from app.core.natural import NaturalLimit, half_of, natural_of, tolerance_about_target
 from app.language.i18n import _
-from app.language.numbers import um
+from app.language.numbers import grouped, um
+from app.views.characteristic.figures.blocks import Block, envelope, summed_up
 from app.views.characteristic.figures.labels import LIMIT, TARGET, TOLERANCE
 from app.views.characteristic.figures.scale import TrueScale, ends_of
 from app.views.characteristic.figures.sizes import SizeAxis, size_lines
@@ -78,8 +79,11 @@ def histogram_counts(deviations: Sequence[float] | Floats, limits: HasLimits) ->
     return [int(count) for count in np.bincount(bars, minlength=len(edges) + 1)]
 
 
-def histogram_figure(counts: Sequence[int], limits: HasLimits) -> Chart:
-    """The spread, lying beside the zone chart: deviation upward (µm), bars to the right; the limits drawn in."""
+def histogram_figure(counts: Sequence[int], limits: HasLimits, *, of: int = 0) -> Chart:
+    """The spread, lying beside the zone chart: deviation upward (µm), bars to the right; the limits drawn in.
+
+    of: how many readings there are, where only the newest are counted.
+    """
     edges = [edge * 1000 for edge in histogram_edges(limits)]
     width = edges[1] - edges[0]
     centres = histogram_centres(limits)
@@ -127,22 +131,37 @@ def histogram_figure(counts: Sequence[int], limits: HasLimits) -> Chart:
     many = max(counts) > FEW
     return Chart(
         [Panel([bars, *lines, *([] if total else [empty(_("No readings yet"))])], deviation)],
-        Axis(_("Readings"), ticks=4, every=None if many else 1, from_zero=True, format="d", fixed=True),
+        Axis(
+            _("Newest {n} of {all} readings").format(n=grouped(total), all=grouped(of)) if of else _("Readings"),
+            ticks=4,
+            every=None if many else 1,
+            from_zero=True,
+            format="d",
+            fixed=True,
+        ),
     )
 
 
-def run_figure(points: Sequence[RunPoint], limits: HasLimits, *, sizes: SizeAxis) -> Chart:
+def run_figure(
+    points: Sequence[RunPoint], limits: HasLimits, *, sizes: SizeAxis, blocks: Sequence[Block] = ()
+) -> Chart:
     """Corrected sizes (mm) over time, with target and tolerance as the drawing has them.
 
     What lies far outside the tolerance is at the edge with its deviation: one probe fault would press all else into a line.
+    blocks: of a long history the older part, by time.
     """
     target, natural = sizes.target, natural_of(limits)
     judged = tolerance_about_target(half_of(limits), natural).judged
-    scale = TrueScale.of(limits, [point.deviation for point in points])
+    ends = [end for block in blocks for end in (block.minimum, block.maximum)]
+    scale = TrueScale.of(limits, [*(point.deviation for point in points), *ends])
     low, high = (end / 1000 for end in ends_of(scale))
+
+    def size(deviation: float) -> float:
+        return round(target + scale.position(deviation) / 1000, 9)
+
     course = Series(
         [point.at for point in points],
-        [round(target + scale.position(point.deviation) / 1000, 9) for point in points],
+        [size(point.deviation) for point in points],
         Pen("faint", 1),
         Dots(
             [ZONE_SYMBOLS.get(p.zone, "circle") + ("-open" if p.excluded else "") for p in points],
@@ -169,9 +188,12 @@ def run_figure(points: Sequence[RunPoint], limits: HasLimits, *, sizes: SizeAxis
             (target, TOLERANCE if natural.side else TARGET),
         )
     ]
-    said = _at_the_edge(points, scale, target) if points else [empty(_("No readings yet"))]
+    said = _at_the_edge(points, scale, target) if points or blocks else [empty(_("No readings yet"))]
     height = Axis(sizes.title, format=".4f", ticks=6, reach=(target + 1.08 * low, target + 1.08 * high))
-    return Chart([Panel([*lines, course, *said], height)], time_axis(), Room(left=92, right=110))
+    older = envelope(blocks, size, Limits.of(limits), over_time=True)
+    axis = time_axis()
+    axis = replace(axis, title=" · ".join([axis.title, *summed_up(blocks, len(points))]))
+    return Chart([Panel([*lines, *older, course, *said], height)], axis, Room(left=92, right=110))
 
 
 def _at_the_edge(points: Sequence[RunPoint], scale: TrueScale, target: float) -> list[Note]:

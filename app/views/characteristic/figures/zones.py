@@ -12,16 +12,17 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from datetime import datetime
+from math import fsum
 from typing import Literal
 
-from app.charts import Axis, Chart, Dots, Note, Panel, Pen, Room, Series, empty
+from app.charts import Axis, Chart, Dots, Faded, Note, Panel, Pen, Room, Series, empty
 from app.charts import Mark as Drawn
 from app.core.decision.limits import HasLimits, Limits
 from app.language.i18n import _
 from app.language.numbers import um
 from app.language.times import plant_zone, written
 from app.loop.timeline.figures import Event, event_lane
-from app.views.characteristic.figures.blocks import Block, envelope
+from app.views.characteristic.figures.blocks import Block, envelope, summed_up
 from app.views.characteristic.figures.by_hand import HandPoint, hand_marks
 from app.views.characteristic.figures.labels import band_grounds, limit_labels, limit_lines, size_ticks
 from app.views.characteristic.figures.lanes import Step, offset_lane
@@ -33,6 +34,8 @@ __all__ = ["Block", "Point", "Step", "zone_chart"]
 
 WIDE = 1500  # pixels from which on there is room for a larger font
 NARROW = 640  # pixels below which there is room for the name and value of a limit only
+MANY = 300  # readings, of more the eye is led by the envelope of so many neighbours that there are GROUPS of them
+GROUPS = 150
 WORD = 70  # pixels that a value in the chart takes
 EVENTS, READINGS, OFFSETS = (0.915, 1.0), (0.18, 0.91), (0.0, 0.14)  # of the height, from the bottom
 
@@ -68,6 +71,7 @@ def zone_chart(
     total_before: float = 0.0,
     width: int = 1240,
     ringed: int | Literal["newest"] | None = "newest",
+    left_out: Sequence[str] = (),
 ) -> Chart:
     """The chart: readings, below them the lane of the corrections, above them that of the events.
 
@@ -75,7 +79,7 @@ def zone_chart(
     steps: corrections by ascending sequence of the reading that caused them; total_before: their sum before the first (mm).
     events: alarms, tool changes and others. hands: what was measured by hand. sizes: for the sizes at the left; without them deviations are there.
     width: of the chart in pixels, about: decides which words have room.
-    ringed: the number of the reading with a ring about it; `newest` is the last one.
+    ringed: the number of the reading with a ring about it; `newest` is the last one. left_out: words about what is not drawn.
     """
     ruler: Scale
     if scale == "zones":
@@ -94,7 +98,7 @@ def zone_chart(
     readings: list[Drawn] = [
         *band_grounds(limits, ruler),
         *limit_lines(limits, ruler),
-        *envelope(blocks, ruler, Limits.of(limits)),
+        *envelope([*blocks, *_in_groups(points)], ruler.position, Limits.of(limits), extremes=blocks),
         *_average(blocks, points, ruler),
         *_readings(points, ruler),
         *_ring(points, ringed, ruler),
@@ -122,7 +126,7 @@ def zone_chart(
             Panel(offsets, total, OFFSETS),
         ],
         Axis(
-            _("Reading number"),
+            " · ".join([_("Reading number"), *summed_up(blocks, len(points)), *left_out]),
             reach=span,
             format="d",
             ticks=9,
@@ -160,11 +164,34 @@ def _hover(point: Point) -> str:
     return "<br>".join(lines)
 
 
+def _in_groups(points: Sequence[Point]) -> list[Block]:
+    """Of many single readings, neighbours with their extremes; of few none. Faults and excluded readings are in none."""
+    if len(points) <= MANY:
+        return []
+    size = -(-len(points) // GROUPS)
+    groups = [
+        [point for point in points[at : at + size] if not point.excluded and point.zone != "probe_fault"]
+        for at in range(0, len(points), size)
+    ]
+    return [
+        Block(
+            group[0].sequence,
+            group[-1].sequence,
+            min(point.deviation for point in group),
+            max(point.deviation for point in group),
+            fsum(point.deviation for point in group) / len(group),
+            link=f"{group[0].link}" if group[0].link else None,
+        )
+        for group in groups
+        if group
+    ]
+
+
 def _readings(points: Sequence[Point], ruler: Scale) -> list[Series]:
     """Every reading: the shape of its zone; hollow if excluded; at the edge with its value if it lies beyond."""
     if not points:
         return []
-    small = 9 if len(points) <= 120 else 7 if len(points) <= 400 else 4
+    small = 9 if len(points) <= 120 else 7 if len(points) <= MANY else 3
     calm = {"zero", "average", "full"}
     colours = [zone_role(point.zone) for point in points]
     dots = Dots(
@@ -229,8 +256,10 @@ def _ring(points: Sequence[Point], ringed: int | Literal["newest"] | None, ruler
 
 def _average(blocks: Sequence[Block], points: Sequence[Point], ruler: Scale) -> list[Series]:
     """M, as it was after each reading; a gap where there was no memory."""
-    # Of very many readings M at the end of each block would be noise: the mean of the block says more.
-    course = [(block.middle, block.average) for block in blocks if len(blocks) <= 150] + [
+    # Of very many readings M would be noise: the mean of neighbours says more.
+    if len(points) > MANY:
+        return []
+    course = [(block.middle, block.average) for block in blocks if len(blocks) <= GROUPS] + [
         (point.sequence, point.average) for point in points
     ]
     if all(value is None for _x, value in course):
@@ -239,7 +268,7 @@ def _average(blocks: Sequence[Block], points: Sequence[Point], ruler: Scale) -> 
         Series(
             [x for x, _value in course],
             [None if value is None else ruler.position(value) for _x, value in course],
-            Pen("average", 1.75, steps="hv" if len(course) <= 400 else "linear"),
+            Pen(Faded("average", 0.7), 1.25, steps="hv" if len(course) <= 400 else "linear"),
             meta="average",
             name=_("Running average M"),
         )

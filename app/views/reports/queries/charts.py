@@ -28,6 +28,7 @@ def chart(frame: Frame) -> Section | None:
         total_before=content.total_before,
         width=WIDE[0],
         ringed=None,
+        left_out=content.left_out,
     )
     says = _("Zone chart of readings {first} to {last}: running average, corrections, tool changes, alarms.").format(
         first=frame.window.first, last=frame.window.last

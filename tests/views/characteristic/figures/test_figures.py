@@ -43,8 +43,8 @@ def zone_chart(*what: Any, theme: Any = "light", **more: Any) -> dict[str, Any]:
     return to_plotly(figures.zone_chart(*what, **more), theme)
 
 
-def histogram_figure(*what: Any) -> dict[str, Any]:
-    return to_plotly(figures.histogram_figure(*what))
+def histogram_figure(*what: Any, **more: Any) -> dict[str, Any]:
+    return to_plotly(figures.histogram_figure(*what, **more))
 
 
 def traces(figure: dict[str, Any], meta: str) -> list[dict[str, Any]]:
@@ -252,6 +252,26 @@ class TestLabels:
         high = TrueScale.of(some, [0.0]).extent
         places = sorted(note["y"] for note in notes if note.get("xref") == "paper" and note.get("yref") == "y")
         assert all(b - a > 0.03 * 2 * high for a, b in itertools.pairwise(places))
+
+
+def test_of_many_readings_the_envelope_leads_the_eye() -> None:
+    few = zone_chart([point(n, 0.001, average=0.0) for n in range(1, 301)], SHAFT)
+    assert not traces(few, "maximum")
+    assert traces(few, "average")
+    points = [point(n, 0.004 if n == 7 else 0.001, average=0.0) for n in range(1, 451)]
+    many = zone_chart([*points, point(451, 1.7)], SHAFT, scale="true")
+    assert not traces(many, "average")
+    (highest,) = traces(many, "maximum")
+    assert max(highest["y"]) == pytest.approx(4.0), "a probe fault measures no part"
+    (readings,) = traces(many, "readings")
+    assert len(readings["x"]) == 451, "each is drawn all the same"
+
+
+def test_what_is_not_drawn_is_counted_below() -> None:
+    title = zone_chart([point(1, 0.0)], SHAFT, left_out=["220 of 5378 corrections"])["layout"]["xaxis"]["title"]["text"]
+    assert title == "Reading number · 220 of 5378 corrections"
+    axis = histogram_figure(histogram_counts([0.0], SHAFT), SHAFT, of=9_000_000)["layout"]["xaxis"]
+    assert axis["title"]["text"] == "Newest 1 of 9\u202f000\u202f000 readings"
 
 
 class TestHistogram:
