@@ -123,6 +123,7 @@ from app.web import api_docs, health
 from app.web.live import Live
 from app.web.openapi import document
 from app.web.own_changes import OwnChanges
+from app.web.page_queries import PageQueries
 from app.web.problems import add_problem_handlers
 from app.web.request_log import RequestLog
 from app.web.security import SecurityHeaders
@@ -385,6 +386,7 @@ def create_plant(settings: Settings, prefix: str = "") -> Application:
     for router in ROUTERS:
         app.router.routes += router.routes  # as they are: include_router would build each again, for every plant
     read_after_recognition(app)
+    app.add_middleware(PageQueries, secure=settings.secure_cookies)
     if replica is not None:
         app.add_middleware(OwnChanges, replica=replica, secure=settings.secure_cookies)
     app.openapi = partial(document, app, readings.SCHEMAS, prefix or "/")  # type: ignore[method-assign]

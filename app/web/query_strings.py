@@ -1,6 +1,5 @@
-"""Query strings, read strictly: an unknown parameter, or one of a single value sent twice, is refused as fields of bodies are.
-
-A filter that is ignored answers with everything, and a machine would take that for what it asked for.
+"""Query strings of programs, read strictly: an unknown parameter, or one of a single value sent twice, is refused as
+fields of bodies are. A filter that is ignored answers with everything, and a machine would take that for what it asked for.
 """
 
 from collections import Counter

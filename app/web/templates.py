@@ -22,6 +22,7 @@ from app.language import i18n, numbers, times
 from app.web import period, states, theme
 from app.web.assets import Assets
 from app.web.doors import door_of, machine_of, search_words, way_to
+from app.web.page_queries import kept_period, said_period
 from app.web.paging import address
 from app.web.request_log import note_reason
 
@@ -63,6 +64,7 @@ def environment() -> Environment:
         percent=numbers.percent,
         in_percent=numbers.in_percent,
         short=numbers.short,
+        grouped=numbers.grouped,
         when=numbers.when,
         as_field=period.field,
         written=lambda at: times.written(at, times.MINUTES),
@@ -124,6 +126,8 @@ def render(request: Request, template: str | Template, **context: Any) -> str:
                     "plant": _plant(request),
                     "plant_root": request.scope.get("root_path", ""),
                     "replica_lag": _replica_lag(request),
+                    "said_period": lambda: said_period(request.query_params),
+                    "kept_period": lambda: kept_period(request.headers.get("cookie", "").encode("latin-1")),
                 }
                 | getattr(state, "waiting", {})
                 | context

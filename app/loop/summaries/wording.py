@@ -8,21 +8,35 @@ from app.core.spc.shewhart import Chart
 from app.core.spc.spread import Estimator
 from app.files.documents.content import Fact, count, deviation, share, width
 from app.language.i18n import _, ngettext
-from app.loop.summaries.queries import Numbers, Rejects
+from app.language.numbers import plain_um, um
+from app.loop.summaries.queries import Numbers, Rejects, Unworn
 
 
-def facts(numbers: Numbers, rejects: Rejects | None = None, of_tool: Rejects | None = None) -> list[Fact]:
+def facts(
+    numbers: Numbers,
+    rejects: Rejects | None = None,
+    of_tool: Rejects | None = None,
+    unworn: Unworn | None = None,
+) -> list[Fact]:
     """Count, mean, standard deviation, extremes, parts in tolerance, corrections.
 
-    rejects: with acceptance n of m, of these readings. of_tool: the same of all parts since the tool was changed.
+    rejects: with acceptance n of m, of these readings. of_tool: the same of all parts since the tool was changed. unworn: the
+    spread without parts of worn tools, where there are any.
     """
+    about_mean = about_deviation = ""
+    if unworn is not None and unworn.standard_deviation is not None:
+        without = ngettext("without %(n)s of a worn tool", "without %(n)s of worn tools", unworn.worn) % {
+            "n": unworn.worn
+        }
+        about_mean = f"{without} {um(unworn.mean, 2)}"
+        about_deviation = f"{without} {plain_um(unworn.standard_deviation, 2)}"
     left_out = _("left out of the numbers below") if numbers.probe_faults else ""
     listed = [
         Fact("count", _("Readings"), count(numbers.count)),
         Fact("excluded", _("Excluded"), count(numbers.excluded)),
         Fact("probe_faults", _("Probe faults"), count(numbers.probe_faults), note=left_out),
-        Fact("mean", _("Mean deviation"), deviation(numbers.mean, 2)),
-        Fact("standard_deviation", _("Standard deviation"), width(numbers.standard_deviation)),
+        Fact("mean", _("Mean deviation"), deviation(numbers.mean, 2), note=about_mean),
+        Fact("standard_deviation", _("Standard deviation"), width(numbers.standard_deviation), note=about_deviation),
         Fact("minimum", _("Smallest deviation"), deviation(numbers.minimum)),
         Fact("maximum", _("Largest deviation"), deviation(numbers.maximum)),
         Fact("in_tolerance", _("In tolerance"), count(numbers.in_tolerance)),

@@ -35,11 +35,13 @@ from app.loop.readings import queries as reading_queries
 from app.loop.summaries import queries as statistics
 from app.loop.summaries import wording as statistics_wording
 from app.loop.summaries.queries import MOST_IN_HISTOGRAM, Window
+from app.loop.tables.readings import Reading
 from app.quality.wear import queries as wear
 from app.quality.wear.queries import Wear
 from app.quality.wear.wording import WearWords
 from app.views.characteristic import chart
 from app.views.characteristic import state_queries as plant
+from app.views.characteristic.chart_corrections import reading_link
 from app.views.characteristic.decisions import Decision, decision, decisions, version_of
 from app.views.characteristic.figures import angle_of, residuals_of, touches_picture
 from app.views.characteristic.figures_api import ResultName
@@ -81,11 +83,17 @@ class CharacteristicView:
 
     @cached_property
     def last(self) -> dict[str, Any] | None:
-        """The last reading, as it was answered."""
-        entry = reading_queries.entry_of(self._session, self.current.characteristic.key)
+        """The last reading, as it was answered: the one that the state is of.
+
+        The highest number may be that of an older reading, which somebody has imported since.
+        """
+        entry, stream = reading_queries.entry_of(self._session, self.current.characteristic.key), self.row.stream
         assert entry is not None
-        newest = reading_queries.answers(self._session, entry, reading_queries.latest(self._session, entry, None, 1))
-        return newest[0] if newest else None
+        found = reading_queries.latest(self._session, entry, None, 1)
+        if found and (found[0].received_at, found[0].measured) != (stream.last_received_at, stream.last_measured):
+            of_the_state = Reading.received_at == stream.last_received_at, Reading.measured == stream.last_measured
+            found = reading_queries.latest(self._session, entry, None, 1, *of_the_state) or found
+        return reading_queries.answers(self._session, entry, found)[0] if found else None
 
     @cached_property
     def window(self) -> Window:
@@ -102,12 +110,12 @@ class CharacteristicView:
         """Numbers of the counted readings; with acceptance n of m parts and sections outside too, also of this tool."""
         session, characteristic = self._session, self.current.characteristic
         numbers = statistics.numbers_of(session, characteristic, self.counted)
+        unworn = statistics.unworn_of(session, characteristic, self.counted, numbers)
         if self.current.parameters.accept_m == 1:
-            return statistics_wording.facts(numbers)
+            return statistics_wording.facts(numbers, unworn=unworn)
         windows = self.counted, statistics.since_tool_change(session, characteristic)
-        return statistics_wording.facts(
-            numbers, *(statistics.rejects_of(session, characteristic, window) for window in windows)
-        )
+        rejects, of_tool = (statistics.rejects_of(session, characteristic, window) for window in windows)
+        return statistics_wording.facts(numbers, rejects, of_tool, unworn)
 
     @cached_property
     def wear(self) -> Wear:
@@ -240,7 +248,7 @@ def send_measured_by_hand(
             raise
         session.expire_all()
         return _reading(request, session, caller, current, sequence, status=error.status, typed=form, problem=error)
-    return RedirectResponse(chart.reading_link(characteristic, sequence), 303)
+    return RedirectResponse(reading_link(characteristic, sequence), 303)
 
 
 @router.post("/characteristics/{characteristic}/readings/{sequence}/exclude")
@@ -259,7 +267,7 @@ def send_exclusion(
             raise
         session.expire_all()
         return _reading(request, session, caller, current, sequence, status=error.status, typed=form, problem=error)
-    return RedirectResponse(chart.reading_link(characteristic, sequence), 303)
+    return RedirectResponse(reading_link(characteristic, sequence), 303)
 
 
 def _reading(
@@ -306,8 +314,8 @@ def _reading(
             shown_decision.reading["average_after"] if limits.average_memory else None,
         ),
         newest=newest,
-        older=chart.reading_link(key, sequence - 1) if sequence > 1 else None,
-        newer=chart.reading_link(key, sequence + 1) if sequence < newest else None,
+        older=reading_link(key, sequence - 1) if sequence > 1 else None,
+        newer=reading_link(key, sequence + 1) if sequence < newest else None,
         chart_url=f"/api/v1/characteristics/{key}/figures/zones?{urlencode(around)}",
         may_exclude=caller.may("operator"),
         typed=typed or {},

@@ -1,11 +1,13 @@
 """The page of a characteristic and of a reading: as plain HTML, and live in a real browser."""
 
 import re
+from pathlib import Path
 from typing import Any
 
 import pytest
 from playwright.sync_api import Page, expect
 
+from tests.loop.readings.importing.test_history import run, table
 from tests.pages.looks import drawn, live, until_shown
 from tests.shop import PARAMETERS, Person, Shop
 from tests.waits import until
@@ -46,6 +48,46 @@ class TestWithoutScripts:
         assert f"Correction {number}" in text
         assert "−6.1\xa0µm" in text
         assert "version 1" in text
+
+    def test_the_card_speaks_of_one_reading(self, shop: Shop, viewer: Person, tmp_path: Path) -> None:
+        shop.read(6.1)
+        run(shop.server.database, table(tmp_path / "old.csv", [39.9992]), shop.characteristic)
+        first = viewer.open(path(shop)).split('class="card charts"')[0]
+        assert "+6.1" in first
+        assert "40.0061" in first
+        assert "39.9992" not in first
+        assert "Why: reading 1." in first
+
+    def test_the_spread_is_said_without_parts_of_a_worn_tool_too(self, shop: Shop, viewer: Person) -> None:
+        shop.push([1.0, 2.0, 3.0])
+        assert "worn tool" not in viewer.open(path(shop))
+        shop.read(390.0)
+        text = viewer.open(path(shop))
+        assert "without 1 of a worn tool +2.00\xa0µm" in text
+        assert "without 1 of a worn tool 1.00\xa0µm" in text
+
+    def test_the_period_goes_along_to_the_other_pages(self, shop: Shop, viewer: Person) -> None:
+        shop.read(0.4)
+        for page in ("", "/control", "/rules", "/capability", "/what-if", "/report"):
+            text = viewer.open(path(shop, f"{page}?last=all&from=&to="))
+            links = re.findall(rf'<a href="({path(shop)}[^"]*)"', text)
+            for other in ("", "/control", "/capability", "/what-if", "/report"):
+                assert path(shop, f"{other}?last=all") in links, (page, other)
+            assert '/rules?last=all"' in text
+
+    def test_a_period_can_be_kept_for_the_session(self, shop: Shop, viewer: Person) -> None:
+        shop.push([0.4, 0.5, 0.6])
+        chosen = f'href="{path(shop, "?last=50")}" aria-current="true"'
+        assert chosen not in viewer.open(path(shop))
+        assert "Keep for this session" in viewer.open(path(shop, "?last=50"))
+        viewer.open(path(shop, "?last=50&keep=yes"))
+        text = viewer.open(path(shop))
+        assert chosen in text
+        assert "Only here, not for the session" in text
+        assert "last=50" in viewer.open(path(shop, "/what-if"))
+        assert 'last=200" aria-current="true"' in viewer.open(path(shop, "?last=200")), "what is said goes before"
+        viewer.open(path(shop, "?keep=no"))
+        assert chosen not in viewer.open(path(shop))
 
     def test_what_to_do_next_and_why_stand_first(self, shop: Shop, viewer: Person) -> None:
         shop.read(0.2)

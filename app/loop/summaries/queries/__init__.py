@@ -6,7 +6,7 @@ readings cost little more than ten thousand, and no extreme is thinned away.
 
 from app.loop.summaries.queries.chart_data import ChartData, ChartReading, chart_data_of, moments_of, single_readings
 from app.loop.summaries.queries.history import History, history_of
-from app.loop.summaries.queries.numbers import MOST_IN_HISTOGRAM, Numbers, histogram_of, numbers_of
+from app.loop.summaries.queries.numbers import MOST_IN_HISTOGRAM, Numbers, Unworn, histogram_of, numbers_of, unworn_of
 from app.loop.summaries.queries.pyramid import Block
 from app.loop.summaries.queries.results import (
     Rejects,
@@ -26,6 +26,7 @@ __all__ = [
     "History",
     "Numbers",
     "Rejects",
+    "Unworn",
     "Window",
     "chart_data_of",
     "histogram_of",
@@ -38,5 +39,6 @@ __all__ = [
     "since_tool_change",
     "single_readings",
     "tool_since",
+    "unworn_of",
     "window_of",
 ]

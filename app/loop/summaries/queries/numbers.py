@@ -6,7 +6,7 @@ Probe faults (|D| ≥ R36) measure no part: they are counted as readings and in 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from math import fsum, sqrt
-from typing import Any
+from typing import Any, NamedTuple
 
 from sqlalchemy import text
 from sqlalchemy.orm import Session
@@ -49,6 +49,14 @@ WHERE machine_id = :machine AND characteristic_id = :characteristic AND sequence
   AND {_OF_A_PART} AND NOT sequence = ANY(CAST(:excluded AS bigint[]))
   AND {in_period_sql("measured_at")}
 GROUP BY bar
+"""  # noqa: S608 - made of the names of our zones
+
+
+_UNWORN = f"""
+SELECT avg(deviation), stddev_samp(deviation) FROM reading
+WHERE machine_id = :machine AND characteristic_id = :characteristic AND sequence BETWEEN :first AND :last
+  AND zone NOT IN ('{Zone.WEAR.value}', '{Zone.PROBE_FAULT.value}')
+  AND NOT sequence = ANY(CAST(:excluded AS bigint[])) AND {in_period_sql("measured_at")}
 """  # noqa: S608 - made of the names of our zones
 
 
@@ -150,6 +158,36 @@ def numbers_of(session: Session, characteristic: Characteristic, window: Window)
         spread = _Spread(measured, mean, squares, minimum, maximum) if measured else None
         parts.append(_Part(spread, corrections, in_tolerance, zones))
     return _total(parts, _excluded_in_time(session, characteristic, excluded, window))
+
+
+class Unworn(NamedTuple):
+    """Mean and standard deviation (mm) without the parts of worn tools; `worn` are those."""
+
+    worn: int
+    mean: float | None
+    standard_deviation: float | None
+
+
+def unworn_of(session: Session, characteristic: Characteristic, window: Window, numbers: Numbers) -> Unworn | None:
+    """The spread without parts in the zone of wear, where there are any: a few of a broken edge hide what the process does.
+
+    Reads every reading of the window.
+    """
+    worn = numbers.zones[Zone.WEAR.value]
+    if not worn:
+        return None
+    found = session.execute(
+        text(_UNWORN),
+        {
+            "machine": characteristic.machine_id,
+            "characteristic": characteristic.id,
+            "first": window.first,
+            "last": window.last,
+            "excluded": list(excluded_of(session, characteristic, window.first, window.last)),
+            **window.period._asdict(),
+        },
+    ).one()
+    return Unworn(worn, *found)
 
 
 def _part(block: Block) -> _Part:
