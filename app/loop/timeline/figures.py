@@ -99,7 +99,7 @@ class _Mark:
             return self.main.text
         if len({event.text for event in self.events}) == 1:
             return f"{self.main.text} ×{len(self.events)}"
-        return _("{n} events").format(n=len(self.events))
+        return f"{self.main.text} +{len(self.events) - 1}"
 
     @property
     def hover(self) -> str:

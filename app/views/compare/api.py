@@ -19,7 +19,8 @@ Of = Annotated[list[str], Query(max_length=12, description="Characteristics.", e
 Tools = Annotated[
     list[Moment] | None,
     Query(
-        max_length=24, description="By tool: those that were changed in at these moments; the last four if left out."
+        max_length=24,
+        description="By tool: those that were changed in at these moments (the first: 1900-01-01T00:00:00Z); the last four if left out.",
     ),
 ]
 ByQuery = Annotated[SeriesBy, Query(description="What differs: characteristics, or versions, tools, periods of each.")]

@@ -1,6 +1,7 @@
 """Page: compared characteristics, versions, tools and periods."""
 
 from collections.abc import Mapping
+from datetime import datetime
 from typing import Annotated
 
 from fastapi import APIRouter, Query, Request, Response
@@ -11,7 +12,7 @@ from app.language.i18n import _
 from app.loop.characteristics import queries as characteristics
 from app.quality.capability import wording as capability
 from app.views.compare.chart import row_of
-from app.views.compare.series import MOST, SeriesBy, compared, tools_of
+from app.views.compare.series import MOST, Compared, SeriesBy, compared, tools_of
 from app.web.choice import ChosenOnPage
 from app.web.deps import FROM_REPLICA, SessionDep
 from app.web.fields import Moment
@@ -64,7 +65,7 @@ def compare_page(
         rows=rows,
         keys=keys,
         by=by.value,
-        tools=[(each, any(each == row.compared for row in rows)) for each in tools],
+        tools=[(each, _identity(each) in {_identity(row.compared) for row in rows}) for each in tools],
         bys=[
             (SeriesBy.CHARACTERISTIC.value, _("Characteristics")),
             (SeriesBy.VERSION.value, _("Versions of the parameters")),
@@ -80,6 +81,11 @@ def compare_page(
         most=MOST,
         capability=capability,
     )
+
+
+def _identity(tool: Compared) -> tuple[int, datetime | None]:
+    """The tool of a characteristic, however many readings it has by now."""
+    return tool.current.characteristic.id, tool.began_at
 
 
 def _address(path: str, keys: list[str], query: Mapping[str, object]) -> str:

@@ -37,7 +37,7 @@ class SeriesBy(StrEnum):
 
 
 class Compared(NamedTuple):
-    """One series: its name, and the readings of a characteristic. began_at: of a tool, when it was changed in."""
+    """One series: its name, and the readings of a characteristic. began_at: of a tool, when it was changed in; of the first, the year 1900."""
 
     name: str
     current: CurrentCharacteristic
@@ -133,7 +133,7 @@ def tools_of(session: Session, current: CurrentCharacteristic) -> list[Compared]
             first = _first_that(session, Reading.received_at >= life.began_at, machine_id, characteristic_id, newest)
         if first <= last:
             name = f"{current.characteristic.name}, {_life(life)}"
-            found.append(Compared(name, current, Window(first, last, newest), life.began_at))
+            found.append(Compared(name, current, Window(first, last, newest), life.began_at or HISTORY_BEGINS))
             last = first - 1
     return found
 

@@ -212,6 +212,18 @@ class TestInTheBrowser:
         expect(page.locator("#numbers dd").first).to_have_text("2")
         assert page.evaluate("window.untouched")
 
+    def test_the_whole_plot_is_on_the_screen_in_every_state(self, shop: Shop, viewer: Person, page: Page) -> None:
+        shop.push([0.4, 6.1, 12.5])  # a correction and an alarm
+        viewer.sign_in(page)
+        page.set_viewport_size({"width": 1280, "height": 800})
+        page.goto(path(shop))
+        fits = f"{PLOT}.data?.length > 0 && {PLOT}.getBoundingClientRect().bottom <= innerHeight"
+        wide = f"{PLOT}.getBoundingClientRect().width > 1200"
+        eventually(page, f"{fits} && {wide}")
+        shop.read(1500.0)  # a probe fault: compensation is paused
+        expect(page.locator("#now")).to_contain_text("Compensation is paused")
+        eventually(page, fits)
+
     def test_a_click_on_a_point_shows_its_reading_and_the_link_opens_it(
         self, shop: Shop, viewer: Person, page: Page
     ) -> None:
