@@ -26,6 +26,7 @@ BARS_PER_SIDE = 15  # whole bars between target and tolerance limit, so that the
 REACH = 1.4  # the histogram ends at so many times the tolerance; what lies further out is in the two end bars
 WHOLE_BARS = round(BARS_PER_SIDE * REACH)  # on each side of the target
 BEYOND_NATURAL = 3  # bars beyond a natural limit, where nothing but the scatter of measuring is
+JOINED = 300  # readings, of more a line only hides them, and over a night none would be true
 FEW = 4  # readings in the longest bar up to which they are counted by ones: there are no half readings
 
 
@@ -162,7 +163,7 @@ def run_figure(
     course = Series(
         [point.at for point in points],
         [size(point.deviation) for point in points],
-        Pen("faint", 1),
+        Pen("faint", 1) if len(points) <= JOINED else None,
         Dots(
             [ZONE_SYMBOLS.get(p.zone, "circle") + ("-open" if p.excluded else "") for p in points],
             [6 if p.zone in ("zero", "average", "full") else 10 for p in points],
