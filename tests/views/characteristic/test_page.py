@@ -217,12 +217,12 @@ class TestInTheBrowser:
         viewer.sign_in(page)
         page.set_viewport_size({"width": 1280, "height": 800})
         page.goto(path(shop))
-        fits = f"{PLOT}.data?.length > 0 && {PLOT}.getBoundingClientRect().bottom <= innerHeight"
-        wide = f"{PLOT}.getBoundingClientRect().width > 1200"
-        eventually(page, f"{fits} && {wide}")
+        expect(page.locator("plotly-chart.zones")).to_have_attribute("tabindex", "0")
+        box = f"{PLOT}.getBoundingClientRect()"
+        eventually(page, f"{box}.bottom <= innerHeight && {box}.width > 1200", 60)
         shop.read(1500.0)  # a probe fault: compensation is paused
         expect(page.locator("#now")).to_contain_text("Compensation is paused")
-        eventually(page, fits)
+        eventually(page, f"{box}.bottom <= innerHeight", 60)
 
     def test_a_click_on_a_point_shows_its_reading_and_the_link_opens_it(
         self, shop: Shop, viewer: Person, page: Page
