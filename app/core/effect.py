@@ -49,6 +49,7 @@ PASSES = 4
 FEWEST_FOR_GAIN, FEWEST_PARTS = 4, 12
 STARTS = (1.0, 0.0, 0.5, 2.0, -1.0)
 CREDIBLE = 0.9999  # of confidence, two-sided, for a verdict on the gain
+HALVED, DOUBLED = 0.75, 1.5  # nearer to 1/2 or to 2 than to 1
 
 
 class Effect(NamedTuple):
@@ -110,8 +111,8 @@ class GainVerdict(StrEnum):
 
     OPPOSITE = "opposite"
     NONE = "none"  # the control does not use this offset
-    WEAK = "weak"  # below 0.5
-    STRONG = "strong"  # above 1.5
+    WEAK = "weak"  # a half, or less
+    STRONG = "strong"  # twice, or more
 
 
 class Gain(NamedTuple):
@@ -169,9 +170,9 @@ def gain_of(deviation: Floats, compensated: Floats, factor: float) -> Gain | Non
 def _verdict(low: float, high: float) -> GainVerdict | None:
     if high < 0:
         return GainVerdict.OPPOSITE
-    if high < 0.5:
+    if high < HALVED:
         return GainVerdict.NONE if low <= 0 else GainVerdict.WEAK
-    return GainVerdict.STRONG if low > 1.5 else None
+    return GainVerdict.STRONG if low > DOUBLED else None
 
 
 def _estimated(y: Floats, x: Floats, begins: Flags, start: float, scatter: float) -> tuple["_Line", float]:

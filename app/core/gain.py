@@ -33,16 +33,19 @@ LONGEST = 48  # parts that are looked at
 # Parts before the first correction that count; on either side of a correction, that say what it did.
 BEFORE, NEAR = 3, 5
 LEVEL_STEP = 0.1  # variance of a step of the level over that of the scatter
-OPPOSITE = -0.3  # the gain is below this: with wear, that of corrections that do nothing is a little below 0
-SURE_OPPOSITE, SURE_NOT_WEAK = 3.0, 5.0  # standard errors that the gain is below 0, and below half of what was asked
+# Parts before the first correction that show how the size wears or warms up; the sum of squares that a slope of none is worth.
+TREND, SHRUNK = 17, 60.0
+OPPOSITE = -0.2  # the gain is below this: with wear, that of corrections that do nothing is a little below 0
+# Standard errors that the gain is below 0, the same where both ask for more than so many times the scatter, and below half.
+SURE_OPPOSITE, LARGE, SURE_OF_LARGE, SURE_NOT_WEAK = 3.0, 2.5, 2.0, 4.0
 LARGEST_ERROR = 0.27  # of the gain
 LEAST = 1.5  # times the scatter that each of the two asks for: smaller ones say nothing
-NOT_DONE, FARTHEST = 0.25, -3.5  # the gain of each of the two alone: beyond, something else has happened, an edge broke
+NOT_DONE, FARTHEST = 0.4, -3.5  # the gain of each of the two alone: beyond, something else has happened, an edge broke
 # And that of the second, the larger one where a sign is wrong: an edge that wears off quickly only seems to undo it.
-AGAIN = -0.25
-SURE_FIRST, SURE_SECOND = 1.9, 3.5  # standard errors that they are below 1, and below half
-# Until so many parts have shown the scatter, the first correction is so many times what it seems to be.
-KNOWN, FRESH = 20, 8.0
+AGAIN = -0.1
+SURE_FIRST, SURE_SECOND = 1.9, 3.0  # standard errors that they are below 1, and below half
+# Until so many parts have shown the scatter, the first correction is so many times what it seems to be, and the gain below this.
+KNOWN, FRESH, FRESH_OPPOSITE = 20, 8.0, -0.3
 # Standard deviations of a step between two parts of one correction: the process moved by itself, as where an edge breaks.
 ITSELF = 4.0
 # A gain that each of two corrections exceeds where the offset has another unit; times the scatter that each has done; how many times
@@ -111,13 +114,20 @@ def opposed(deviation: Floats, compensated: Floats, factor: float, begin: int, e
 
 def _steps(deviation: Floats, compensated: Floats, factor: float, places: tuple[int, int, int]) -> tuple[Step, Step]:
     """Return what the two newest corrections asked and did. places: the beginning, and where each took effect."""
-    ends = (*places, len(deviation))
-    steps = []
-    for low, at, high in zip(ends, ends[1:], ends[2:], strict=False):
-        done = deviation[at : min(high, at + NEAR)].mean() - deviation[max(low, at - NEAR) : at].mean()
-        before, after = float(compensated[at - 1]), float(compensated[at])
-        steps.append(Step((before - after) / factor, float(done), before, after))
-    return steps[0], steps[1]
+    start, first, second = places
+    end = len(deviation)
+    return (
+        _step(deviation, compensated, factor, (start, first, second)),
+        _step(deviation, compensated, factor, (first, second, end)),
+    )
+
+
+def _step(deviation: Floats, compensated: Floats, factor: float, places: tuple[int, int, int]) -> Step:
+    """Return what a correction asked and did. places: where the one before it took effect, it, and the one behind it."""
+    low, at, high = places
+    done = deviation[at : min(high, at + NEAR)].mean() - deviation[max(low, at - NEAR) : at].mean()
+    before, after = float(compensated[at - 1]), float(compensated[at])
+    return Step((before - after) / factor, float(done), before, after)
 
 
 def overdone(deviation: Floats, compensated: Floats, factor: float, expected: float) -> tuple[float, float] | None:
@@ -144,6 +154,23 @@ def overdone(deviation: Floats, compensated: Floats, factor: float, expected: fl
     return sum(step.asked * step.done for step in steps) / asked, expected * sqrt(2 / asked)
 
 
+def against(deviation: Floats, compensated: Floats, factor: float, expected: float) -> Step | None:
+    """The newest change of the corrections in effect, if the size went the other way by about as much.
+
+    One is no proof, an edge that breaks does the same; but where a person has to look, it says where. expected: as in `opposed`.
+
+    >>> found = against(np.array([0.012, 0.048]), np.array([0.006, 0.042]), 1.0, 0.0003)
+    >>> round(found.asked, 3), round(found.done, 3), against(np.array([0.012, 0.3]), np.array([0.006, 0.042]), 1.0, 0.0003)
+    (-0.036, 0.036, None)
+    """
+    _start, before, newest = newest_two(compensated, 0)
+    if newest == 0:
+        return None
+    step = _step(deviation, compensated, factor, (before, newest, len(deviation)))
+    clear = min(abs(step.asked), abs(step.done)) >= 2 * LEAST * expected
+    return step if clear and FARTHEST <= step.done / step.asked <= OPPOSITE else None
+
+
 def newest_two(compensated: Floats, begin: int) -> tuple[int, int, int]:
     """Return where the correction before the newest two, and those two, took effect; 0 where there are not two."""
     first, second = 0, 0
@@ -156,6 +183,25 @@ def newest_two(compensated: Floats, begin: int) -> tuple[int, int, int]:
             else:
                 return i, first, second
     return begin, first, second
+
+
+def trend_before(deviation: Floats, compensated: Floats, factor: float, low: int, first: int, itself: float) -> float:
+    """Return what the size wears and warms up by from part to part before the first of the two corrections, mm.
+
+    The slope of a least-squares line through parts that earlier corrections are taken out of as if they had acted in full, since the
+    last step that the size made by itself; less than it while there are few parts.
+    """
+    t_sum, w_sum, tt, tw, count = 0.0, 0.0, 0.0, 0.0, 0
+    before = 0.0
+    for i in range(max(low, first - TREND), first):
+        level = deviation[i] + compensated[i] / factor
+        if count and abs(level - before) > itself:
+            t_sum, w_sum, tt, tw, count = 0.0, 0.0, 0.0, 0.0, 0
+        before, t = level, float(i - first)
+        t_sum, w_sum, tt, tw, count = t_sum + t, w_sum + level, tt + t * t, tw + t * level, count + 1
+    if count < NEAR:
+        return 0.0
+    return (tw - t_sum * w_sum / count) / (tt - t_sum * t_sum / count + SHRUNK)
 
 
 def scatter_of(deviation: Floats, compensated: Floats, factor: float, expected: float) -> float:
@@ -201,6 +247,7 @@ def judge(
         return False, first, second, 0.0, 0.0
     scatter = scatter_of(deviation, compensated, factor, expected)
     start, itself = max(start, first - BEFORE), ITSELF * sqrt(2.0) * scatter
+    trend = trend_before(deviation, compensated, factor, begin, first, itself)
     level_d, level_x = deviation[start], -compensated[start] / factor
     p = 1.0 + LEVEL_STEP
     xx, xd, xx_first, xd_first = 0.0, 0.0, 0.0, 0.0
@@ -213,23 +260,24 @@ def judge(
             level_d, level_x, p = deviation[i], -compensated[i] / factor, 1.0 + LEVEL_STEP
             continue
         variance = p + 1.0
-        missed_d, missed_x = deviation[i] - level_d, -compensated[i] / factor - level_x
+        missed_d, missed_x = deviation[i] - level_d - trend, -compensated[i] / factor - level_x
         xx += missed_x * missed_x / variance
         xd += missed_x * missed_d / variance
         k = p / variance
-        level_d += k * missed_d
+        level_d += trend + k * missed_d
         level_x += k * missed_x
         p = p - k * p + LEVEL_STEP
     gain, error = xd / xx, scatter / sqrt(xx)
     first_gain, second_gain = xd_first / xx_first, (xd - xd_first) / (xx - xx_first)
+    least = min(abs(asked_first), abs(asked_second))
     surer = 1 + FEW / (PRIOR + count - 2)
     clearly = (
         gain < OPPOSITE
-        and gain + SURE_OPPOSITE * error < 0
+        and gain + (SURE_OF_LARGE if least > LARGE * scatter else SURE_OPPOSITE) * error < 0
         and gain + SURE_NOT_WEAK * surer * error < 0.5
         and error < LARGEST_ERROR
-        and min(abs(asked_first), abs(asked_second)) > LEAST * scatter
-        and (count >= KNOWN or abs(asked_first) > FRESH * scatter)
+        and least > LEAST * scatter
+        and (count >= KNOWN or (abs(asked_first) > FRESH * scatter and gain < FRESH_OPPOSITE))
     )
     each = (
         FARTHEST < first_gain < NOT_DONE

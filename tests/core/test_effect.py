@@ -114,7 +114,9 @@ def test_a_filter_by_hand() -> None:
     assert variance[2] == pytest.approx(3.0)
 
 
-@pytest.mark.parametrize(("gain", "verdict"), [(-1.0, "opposite"), (0.0, "none"), (1.0, None), (2.0, "strong")])
+@pytest.mark.parametrize(
+    ("gain", "verdict"), [(-1.0, "opposite"), (0.0, "none"), (0.5, "weak"), (1.0, None), (2.0, "strong")]
+)
 def test_a_gain_is_told_from_few_corrections_whatever_it_is(gain: float, verdict: str | None) -> None:
     chance = np.random.default_rng(3)
     offset = np.array([0, 4, -3, 5, -4, 4], np.float64).repeat(5) * 0.001

@@ -159,7 +159,7 @@ def corrected_tools(session: Session) -> list[Unit]:
 
 
 def tell_gain(session: Session, unit: Unit) -> None:
-    """A gain that credibly lies outside 0.5 to 1.5 raises *unusual gain*, once until it is answered."""
+    """A gain that is credibly nearer to a half or to 2 than to 1 raises *unusual gain*, once until it is answered."""
     machine_id, number = (int(part) for part in unit.key)
     machine = session.get_one(Machine, machine_id)
     told = [each for each in gain_queries.gains(session, machine, number) if each.gain and each.gain.verdict]

@@ -33,7 +33,7 @@ class AppliedIn(Body):
 class OffsetReportIn(Body):
     """The offset that the control holds, as it was read there."""
 
-    offset: Length
+    offset: Annotated[Length, Field(description="The offset that the control holds now, mm.")]
     none_applied: Annotated[
         bool,
         Field(
@@ -55,7 +55,7 @@ class OffsetReportOut(BaseModel):
     ]
     superseded: Annotated[list[int], Field(description="Corrections that must not be applied any more.")]
     paused_by: Annotated[int | None, Field(description="Number of the alarm that pauses the tool.")]
-    note: str | None = None
+    note: Annotated[str | None, Field(description="What else is to be said; null: nothing.")] = None
 
 
 class CorrectionDecisionIn(Body):
@@ -89,7 +89,7 @@ class RejectionIn(CorrectionDecisionIn):
 class ToolEdit(Body):
     """The offset as somebody has set it by hand."""
 
-    offset: Length
+    offset: Annotated[Length, Field(description="The offset that the control holds now, mm.")]
     reason: Reason
 
 
@@ -103,7 +103,7 @@ class ToolChange(Body):
 class EmpiricalValueIn(Body):
     """The empirical value: machine reading minus true value, taken off every measurement."""
 
-    empirical_value: Length
+    empirical_value: Annotated[Length, Field(description="Machine reading minus true value, mm.")]
     reason: Reason
 
 
@@ -112,7 +112,7 @@ class ReadingReason(BaseModel):
 
     code: str
     text: str
-    notes: list[str] = []
+    notes: Annotated[list[str], Field(description="What else was considered, as codes.")] = []
 
 
 class CorrectionOut(BaseModel):
@@ -122,7 +122,12 @@ class CorrectionOut(BaseModel):
     number: Annotated[int, Field(description="Counts per machine, without gaps.")]
     tool_memory: Annotated[int, Field(description="R10")]
     amount: Annotated[float, Field(description="What the offset changes by, mm.")]
-    status: Status
+    status: Annotated[
+        Status,
+        Field(
+            description="held, awaiting_approval: a person decides first; pending: apply it; applied; rejected, superseded: it must not be applied."
+        ),
+    ]
     characteristic: str
     sequence: Annotated[int, Field(description="The reading that asked for it.")]
     size_error: Annotated[float, Field(description="The error of size that it removes, mm.")]
@@ -133,16 +138,20 @@ class CorrectionOut(BaseModel):
             description="The offset once the pending ones up to this one, and this one, are applied; open ones only."
         ),
     ]
-    applied_at: datetime | None
-    applied_by: str | None
-    offset_after: float | None
+    applied_at: Annotated[datetime | None, Field(description="When it took effect; null: not yet.")]
+    applied_by: Annotated[str | None, Field(description="Who confirmed it.")]
+    offset_after: Annotated[
+        float | None, Field(description="The offset that the control held afterwards, mm; null: not said.")
+    ]
     mapping: Annotated[str | None, Field(description="Hash of the mapping by which a bridge converted it.")]
     decided_at: Annotated[datetime | None, Field(description="When it was released, approved, rejected or superseded.")]
-    decided_by: str | None
+    decided_by: Annotated[str | None, Field(description="Who decided that.")]
     status_reason: Annotated[str | None, Field(description="What was said when that was decided.")]
-    superseded_by: int | None
+    superseded_by: Annotated[
+        int | None, Field(description="Number of the correction that takes its place; null: none.")
+    ]
     fetched_at: Annotated[datetime | None, Field(description="When it was first fetched as program text.")]
-    fetched_by: str | None
+    fetched_by: Annotated[str | None, Field(description="Who fetched it.")]
     reason: Annotated[ReadingReason | None, Field(description="The reading that asked for it: code and sentence.")]
     note: Annotated[str | None, Field(description="What else is to be said about what was just done.")] = None
 
@@ -150,11 +159,11 @@ class CorrectionOut(BaseModel):
 class CorrectionBrief(BaseModel):
     """A correction, in short."""
 
-    number: int
-    amount: float
-    status: Status
+    number: Annotated[int, Field(description="Counts per machine, without gaps.")]
+    amount: Annotated[float, Field(description="What the offset changes by, mm.")]
+    status: Annotated[Status, Field(description="As of a correction: pending, applied …")]
     created_at: datetime
-    applied_at: datetime | None
+    applied_at: Annotated[datetime | None, Field(description="When it took effect; null: not yet.")]
 
 
 class GainOut(BaseModel):
@@ -168,7 +177,9 @@ class GainOut(BaseModel):
     corrections: Annotated[int | None, Field(description="Changes of the offset that show it.")]
     verdict: Annotated[
         Literal["opposite", "none", "weak", "strong"] | None,
-        Field(description="Where it credibly lies outside 0.5 to 1.5; `none`: corrections change nothing."),
+        Field(
+            description="Where it is credibly nearer to a half or to 2 than to 1; `none`: corrections change nothing."
+        ),
     ]
 
 
@@ -180,12 +191,14 @@ class ToolOut(BaseModel):
     offset: Annotated[float, Field(description="The offset that the control is known to hold, mm.")]
     total: Annotated[float, Field(description="Sum of the corrections applied since the tool was changed, mm.")]
     parts: Annotated[int, Field(description="Parts cut since the tool was changed.")]
-    changed_at: datetime | None
+    changed_at: Annotated[datetime | None, Field(description="When the tool was changed last; null: never on record.")]
     reset_at: Annotated[
         datetime | None, Field(description="Changed, or edited by hand: parts cut before say nothing about it.")
     ]
     last_correction: Annotated[CorrectionBrief | None, Field(description="The one issued last, and its status.")]
-    open_corrections: list[CorrectionBrief]
+    open_corrections: Annotated[
+        list[CorrectionBrief], Field(description="Corrections that are neither applied nor ended.")
+    ]
     characteristics: Annotated[list[str], Field(description="Which characteristics correct it.")]
     edge: Annotated[str | None, Field(description="The cutting edge: D number or name.")]
     name: Annotated[str | None, Field(description="What the tool is called.")]
@@ -208,7 +221,7 @@ class ToolSet(ToolOut):
     """A location whose offset was set just now."""
 
     superseded: Annotated[list[int], Field(description="Corrections that must not be applied any more.")]
-    note: str | None = None
+    note: Annotated[str | None, Field(description="What else is to be said; null: nothing.")] = None
     warnings: Warnings
 
 
