@@ -1,11 +1,14 @@
 """Alarm kinds that a reading raises: the signals of the decision (`app.core.decision.decide.ReadingAlarm`)."""
 
+from collections.abc import Mapping
+from typing import Any
+
 from sqlalchemy import select
 from sqlalchemy.orm import object_session
 
 from app.core.probing import TouchError
 from app.language.i18n import _
-from app.language.numbers import tolerance_um, um
+from app.language.numbers import NOTHING, tolerance_um, um
 from app.loop.alarms.kinds import AlarmKind, register
 from app.loop.readings.wording import first_move_sentence, touch_problem
 from app.loop.tables.alarms import Alarm
@@ -17,7 +20,25 @@ def _deviation(alarm: Alarm, text: str) -> str:
         "deviation": um(alarm.data.get("deviation")),
         "limit": tolerance_um(alarm.data.get("limit") or 0.0, alarm.data.get("natural_limit")),
     }
-    return text.format(tool=alarm.tool_memory, **values)
+    return f"{text.format(tool=alarm.tool_memory, **values)}{_against(alarm)}"
+
+
+def moved_by(step: Mapping[str, Any]) -> str:
+    """Word what corrections asked and did, as it stands in the values of an alarm."""
+    return _("correction {numbers} of {amount} asked for {asked} and the size changed by {done}").format(
+        numbers="+".join(map(str, step.get("numbers") or ())) or NOTHING,
+        amount=um(step.get("amount")),
+        asked=um(step.get("asked")),
+        done=um(step.get("done")),
+    )
+
+
+def _against(alarm: Alarm) -> str:
+    """A sentence where the newest correction moved the size the wrong way: the edge is not the cause, perhaps."""
+    if "against" not in alarm.data:
+        return ""
+    text = _("The size went the wrong way: {step}. Check the sign of the factor and the offset register.")
+    return " " + text.format(step=moved_by(alarm.data["against"]))
 
 
 def _tool_worn(alarm: Alarm) -> str:

@@ -3,9 +3,10 @@
 from datetime import datetime
 
 from app.language.i18n import _, ngettext
-from app.language.numbers import NOTHING, PLUS_MINUS, fixed, mm, signed, um, um_limit
+from app.language.numbers import PLUS_MINUS, fixed, mm, signed, um, um_limit
 from app.language.times import MINUTES, written
 from app.loop.alarms.kinds import AlarmKind, register
+from app.loop.alarms.reading_kinds import moved_by
 from app.loop.tables.alarms import Alarm
 from app.loop.tables.tools import OPPOSITE
 
@@ -42,21 +43,12 @@ def _life(alarm: Alarm) -> str:
 
 def _opposed(alarm: Alarm) -> str:
     data = alarm.data
-    steps = [
-        _("correction {numbers} of {amount} asked for {asked} and the size changed by {done}").format(
-            numbers="+".join(map(str, each.get("numbers") or ())) or NOTHING,
-            amount=um(each.get("amount")),
-            asked=um(each.get("asked")),
-            done=um(each.get("done")),
-        )
-        for each in data.get("corrections", ())
-    ]
     return _(
         "Two corrections in a row moved {characteristic} the wrong way: {steps}. The gain is {gain} {pm} {error}, it should be "
         "1. Nothing is corrected through tool {tool} until this alarm is answered."
     ).format(
         characteristic=data.get("characteristic"),
-        steps="; ".join(steps),
+        steps="; ".join(map(moved_by, data.get("corrections", ()))),
         gain=signed(data.get("gain"), 2),
         pm=PLUS_MINUS,
         error=fixed(data.get("error"), 2),

@@ -12,6 +12,8 @@ from tests.shop import Person, Shop
 SHAFT = {"tolerance_width": 0.1, "averaging_limit": 0.004, "weighting_factor": 1, "factor": 1}
 """The loop of cases/wrong-sign-loop.csv: the factor is +1, the tool needs -1."""
 
+WORN = {"tolerance_width": 0.06, "wear_limit": 0.04}
+
 
 @pytest.fixture
 def loop(shop: Shop) -> "Loop":
@@ -154,6 +156,34 @@ def test_a_right_gain_raises_nothing(shop: Shop, server: Any) -> None:
     (told,) = shop.tool(4)["gains"]
     assert told["gain"] == pytest.approx(1, abs=0.3)
     assert told["verdict"] is None
+
+
+def test_a_worn_tool_that_corrections_moved_the_wrong_way_is_no_worn_tool_alone(shop: Shop) -> None:
+    """Two characteristics correct one tool in each part: R37 holds the fourth correction before either has seen two of its own."""
+    both = [shop.another("wrong", tool_memory=4, average_memory=memory, **SHAFT | WORN) for memory in (6, 7)]
+    offset, last, answers = 0.0, 0, list[Any]()
+    for key in both * 2:
+        answers.append(shop.read(6 + 1000 * offset, key, correction_in_effect=last))
+        if answers[-1]["action"] == "correct":
+            offset, last = round(offset + answers[-1]["correction"]["amount"], 9), answers[-1]["correction"]["number"]
+            shop.correction(last, "applied", offset_after=offset, client=shop.machine_client)
+    assert [each["action"] for each in answers] == ["correct", "correct", "correct", "hold"]
+    (worn,) = [each for each in shop.alarms() if each["kind"] == "tool_worn"]
+    assert worn["data"]["against"]["numbers"] == [2, 3]
+    assert (
+        "is worn or broken. The size went the wrong way: correction 2+3 of +36.0\u00a0µm asked for −36.0"
+        in worn["text"]
+    )
+    assert "the size changed by +36.0\u00a0µm. Check the sign of the factor" in worn["text"]
+
+
+def test_a_tool_that_wears_off_beside_small_corrections_is_worn(shop: Shop) -> None:
+    key = shop.another("worn", tool_memory=4, average_memory=6, **SHAFT | WORN | {"factor": -1})
+    answer = shop.read(5.0, key, correction_in_effect=0)
+    shop.correction(answer["correction"]["number"], "applied", offset_after=-0.005, client=shop.machine_client)
+    assert shop.read(60.0, key, correction_in_effect=1)["action"] == "hold"
+    (worn,) = [each for each in shop.alarms() if each["kind"] == "tool_worn"]
+    assert "sign" not in worn["text"]
 
 
 def test_corrections_that_were_never_applied_prove_nothing(shop: Shop) -> None:

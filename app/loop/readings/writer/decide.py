@@ -22,7 +22,7 @@ from app.loop.readings.records import Entry
 from app.loop.readings.schemas import ReadingIn
 from app.loop.readings.wording import touch_problem
 from app.loop.readings.writer.corrections_in_effect import confirm, corrections_in_effect, issued_total
-from app.loop.readings.writer.opposed import pauses, remember
+from app.loop.readings.writer.opposed import name_correction, pauses, remember
 from app.loop.readings.writer.pending import (
     PendingAlarm,
     PendingCorrection,
@@ -90,13 +90,14 @@ def decide_reading(pending: PendingWrites, entry: Entry, reading: ReadingIn, now
         by_hand=parameters.rules.of_tool and tool is not None and tool.set_by_hand,
         fault=Code.FIRST_MOVE_TRIGGERED if reading.first_move_triggered else Code.TOUCH_FAULT if fault else None,
     )
-    decision, opposed = judged(state=state), None
+    decision = judged(state=state)
     late = stream.last_measured_at is not None and measured_at < stream.last_measured_at
-    if decision.amount is not None and compensated is not None and not (late or jump):
-        opposed = pauses(pending, stream, Part(sequence, deviation, compensated))
+    newest = None if compensated is None or late or jump or fault else Part(sequence, deviation, compensated)
+    opposed = pauses(pending, stream, newest) if decision.amount is not None and newest else None
     if opposed is not None:
         paused_by, decision = opposed, judged(state=state._replace(paused=True))
     alarms = [_signal(pending, stream, signal, sequence, decision, results, fault) for signal in decision.alarms]
+    name_correction(alarms, stream, newest)
     alarms += [] if opposed is None else [opposed]
     correction = _issue(pending, stream, tool, sequence, decision) if tool and decision.amount is not None else None
 

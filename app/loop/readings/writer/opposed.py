@@ -4,6 +4,7 @@ Judged by `app.core.gain` on the newest parts of the stream (`PendingStream.part
 reading that asks for nothing is not judged, it is only remembered: the quiet readings of a batch included (`columnar`).
 """
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -11,7 +12,7 @@ import numpy as np
 from app.core.decision.decide import Decision
 from app.core.decision.limits import nanometres
 from app.core.decision.step import Action
-from app.core.gain import LONGEST, Step, expected_scatter, opposed
+from app.core.gain import LONGEST, Step, against, expected_scatter, opposed
 from app.loop.readings.writer.pending import PendingAlarm, PendingStream, PendingTool, PendingWrites
 from app.loop.readings.writer.snapshot import Part
 from app.loop.tables.tools import OPPOSITE
@@ -64,6 +65,23 @@ def pauses(pending: PendingWrites, stream: PendingStream, newest: Part) -> Pendi
     pending.touched_machines.add(tool.machine_id)
     tool.pause(alarm)
     return alarm
+
+
+def name_correction(alarms: Sequence[PendingAlarm], stream: PendingStream, newest: Part | None) -> None:
+    """Say in alarms about a deviation that the newest correction moved the size the wrong way, if it did: the sign may be the cause."""
+    if not alarms or newest is None or stream.tool is None:
+        return
+    parts = [part for part in stream.parts[1 - LONGEST :] if part.sequence > stream.gain_from] + [newest]
+    parameters = stream.parameters
+    found = against(
+        np.array([part.deviation for part in parts]),
+        np.array([part.compensated for part in parts]),
+        parameters.factor,
+        expected_scatter(parameters.zero_range, parameters.averaging_limit),
+    )
+    if found is not None:
+        for alarm in alarms:
+            alarm.data["against"] = _said(stream.tool, found)
 
 
 def _said(tool: PendingTool, step: Step) -> dict[str, Any]:
