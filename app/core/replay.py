@@ -38,7 +38,6 @@ from app.core.decision.loops import (
     follow_each,
 )
 from app.core.decision.step import DECIMALS
-from app.core.natural import Tolerance
 from app.core.parameters import Feature, Parameters
 
 LONGEST_DELAY = 200  # parts
@@ -83,8 +82,8 @@ class Policy(NamedTuple):
 class Figures(NamedTuple):
     """Figures of a replay, of the readings that count and are not left out; mm, None where there are too few.
 
-    rejects: parts out of tolerance, probe faults apart. Mean, spread, Ppk and largest are of the `inner` readings, within
-    R37: an operator decides about those beyond. mean_size: of the size errors that corrections removed.
+    rejects: parts out of tolerance, probe faults apart; a tool that is measured itself is none. Mean, spread, Ppk and largest are of
+    the `inner` readings, within R37: an operator decides about those beyond. mean_size: of the size errors that corrections removed.
     """
 
     readings: int
@@ -172,7 +171,7 @@ def run(trace: ProcessTrace, policy: Policy) -> tuple[ReplayResult, Figures]:
     result = ReplayResult.room(len(trace.free))
     tally = np.zeros(1, TALLY)
     follow(trace, rows_of([policy])[0], policy.delay, result, tally[0])
-    return result, _figures(tally[0], _tolerance(policy))
+    return result, _figures(tally[0], _counted(policy))
 
 
 def figures_of(trace: ProcessTrace, policies: Sequence[Policy]) -> list[Figures]:
@@ -181,7 +180,7 @@ def figures_of(trace: ProcessTrace, policies: Sequence[Policy]) -> list[Figures]
         return []
     tallies = np.zeros(len(policies), TALLY)
     follow_each(trace, rows_of(policies), policies[0].delay, ReplayResult.room(0), tallies)
-    return [_figures(tally, _tolerance(policy)) for tally, policy in zip(tallies, policies, strict=True)]
+    return [_figures(tally, _counted(policy)) for tally, policy in zip(tallies, policies, strict=True)]
 
 
 def rows_of(policies: Sequence[Policy]) -> Rows:
@@ -189,13 +188,15 @@ def rows_of(policies: Sequence[Policy]) -> Rows:
     return np.array([[lane.row() for lane in policy.lanes] for policy in policies], LANE)
 
 
-def _tolerance(policy: Policy) -> Tolerance:
-    """The limits of the lane that counts last: the newest version."""
-    return next(lane.parameters.tolerance for lane in reversed(policy.lanes) if lane.counts)
+def _counted(policy: Policy) -> Parameters:
+    """The parameters of the lane that counts last: the newest version."""
+    return next(lane.parameters for lane in reversed(policy.lanes) if lane.counts)
 
 
-def _figures(tally: Any, tolerance: Tolerance) -> Figures:
+def _figures(tally: Any, parameters: Parameters) -> Figures:
     number = dict(zip(TALLY.names or (), tally.item(), strict=True))
+    if parameters.feature is Feature.TOOL:
+        number["rejects"] = 0
     total, squares, largest, sizes = (number.pop(name) for name in ("sum", "squares", "largest", "sizes"))
     inner, corrections = number["inner"], number["corrections"]
     mean = total / inner if inner else None
@@ -205,7 +206,7 @@ def _figures(tally: Any, tolerance: Tolerance) -> Figures:
         if not nanometres(spread * 1000):  # of equal readings rounding alone is left
             spread = 0.0
         elif inner >= FEWEST_FOR_PPK:
-            ppk = tolerance.room(mean) / (3 * spread)
+            ppk = parameters.tolerance.room(mean) / (3 * spread)
     return Figures(
         **number,
         mean_size=sizes / corrections if corrections else None,

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 
+from app.core.decision.decide import LoopState, ReadingAlarm, decide
 from app.core.decision.limits import ZONES
 from app.core.decision.loops import Mark, ProcessTrace, ReplayResult, _rounded
 from app.core.decision.step import CODES, Code
@@ -273,3 +274,11 @@ def test_a_way_without_readings_amounts_to_nothing() -> None:
     assert (figures.readings, figures.mean, figures.spread, figures.ppk, figures.largest) == (0, None, None, None, None)
     assert figures_of(without_events(np.zeros(0)), []) == []
     assert len(ReplayResult.room(0).deviation) == 0
+
+
+def test_the_size_of_a_tool_is_no_reject_and_out_by_what_is_not_corrected() -> None:
+    """20 µm short from the first reading on: the one correction that it asks for is in the offset afterwards."""
+    tool = replace(SEAT, feature=Feature.TOOL, factor=1.0)
+    _, figures = run(without_events(np.full(5, -0.02)), Policy((ReplayedCharacteristic(tool, -1.0),)))
+    assert (figures.rejects, figures.oversize, figures.undersize, figures.corrections) == (0, 0, 1, 1)
+    assert decide(tool, LoopState(0.0), deviation=-0.02, outstanding=0.06).alarms == (ReadingAlarm.OVERSIZE,)

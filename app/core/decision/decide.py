@@ -40,6 +40,7 @@ from app.core.decision.step import (
     Action,
     Code,
     effect_of,
+    judged_size,
     step,
 )
 from app.core.parameters import Mode, Parameters
@@ -145,17 +146,15 @@ def decide(
         BELIEVED if fault is None else CODES.index(fault),
         by_hand,
     )
-    good = (
-        within_tolerance(made.decided if parameters.rules.of_tool else deviation, parameters.limits) and fault is None
-    )
-    good = good and made.code != BEYOND_NATURAL_LIMIT
+    size = judged_size(parameters.rules, deviation, made.decided)
+    good = within_tolerance(size, parameters.limits) and fault is None and made.code != BEYOND_NATURAL_LIMIT
     alarms = []
     if made.zone == FAULT:
         alarms.append(ReadingAlarm.PROBE_FAULT)
     elif made.zone == WEAR and not previous_tool:
         alarms.append(ReadingAlarm.TOOL_WORN)
     elif not good:
-        alarms.append(ReadingAlarm.OVERSIZE if deviation > 0 else ReadingAlarm.UNDERSIZE)
+        alarms.append(ReadingAlarm.OVERSIZE if size > 0 else ReadingAlarm.UNDERSIZE)
     if not accepted:
         alarms.append(ReadingAlarm.ACCEPTANCE)
     if made.jumped:

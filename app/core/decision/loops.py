@@ -27,6 +27,7 @@ from app.core.decision.step import (
     Rules,
     deviation_of,
     effect_of,
+    judged_size,
     not_in_size,
     rounded,
     step,
@@ -239,8 +240,8 @@ def _count(tally: Any, rules: Any, deviation: float, made: Any) -> None:
         tally.faults += 1
     elif made.zone == WEAR:
         tally.worn += 1
-    elif not within(size, rules.tolerance):
-        if deviation > 0:
+    elif not within(nanometres(judged_size(rules, deviation, made.decided)), rules.tolerance):
+        if judged_size(rules, deviation, made.decided) > 0:
             tally.oversize += 1
         else:
             tally.undersize += 1

@@ -162,6 +162,11 @@ def not_in_size(rules: Rules, total: float, pending: float) -> float:
     return total if rules.of_tool else pending
 
 
+def judged_size(rules: Rules, deviation: float, decided: float) -> float:
+    """Return the deviation that the tolerance holds for: of a part its own, of a tool what it is not corrected for."""
+    return decided if rules.of_tool else deviation
+
+
 def exceeds(total: float, amount: float, limit: float) -> bool:
     """Return whether a correction takes the sum beyond its limit. One that leads back towards zero never does."""
     if limit == inf:

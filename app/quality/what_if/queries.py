@@ -13,7 +13,7 @@ from app.core.decision.limits import FAULT, WEAR, in_nanometres, nanometres, rea
 from app.core.decision.loops import ReplayResult, Whole
 from app.core.decision.step import OFFSET_LIMIT
 from app.core.effect import Effect, measured_effect
-from app.core.parameters import ParameterError, Parameters, read
+from app.core.parameters import Feature, ParameterError, Parameters, read
 from app.core.policy_map import Criterion, Region, best_region, in_order, with_settings
 from app.core.replay import FEWEST_FOR_PPK, Figures, agreement, figures_of, run
 from app.core.spc import USUAL_READINGS
@@ -266,10 +266,12 @@ def truly_of(session: Session, past: ToolHistory) -> Figures:
     )
     deviation = history["deviation"]
     size = in_nanometres(deviation)
+    current = past.current.parameters
+    judged = history["decided"] if current.rules.of_tool else deviation
     zone, code = history["zone"], history["code"]
     fault, worn = zone == FAULT, zone == WEAR
-    bad = ~within(size, tolerance)
-    outside = bad & ~fault & ~worn
+    outside = ~within(in_nanometres(judged), tolerance) & ~fault & ~worn
+    bad = ~within(size, tolerance) & (current.feature is not Feature.TOOL)
     issued = (history["correction"] >= 0) & counted
     held = issued & np.isin(code, HELD)
     inner = deviation[~reaches(size, wear) & counted]
@@ -283,8 +285,8 @@ def truly_of(session: Session, past: ToolHistory) -> Figures:
     return Figures(
         readings=int(counted.sum()),
         rejects=int((bad & ~reaches(size, confidence) & counted).sum()),
-        oversize=int((outside & (deviation > 0) & counted).sum()),
-        undersize=int((outside & (deviation < 0) & counted).sum()),
+        oversize=int((outside & (judged > 0) & counted).sum()),
+        undersize=int((outside & (judged < 0) & counted).sum()),
         worn=int((worn & counted).sum()),
         faults=int((fault & counted).sum()),
         offset_limit=int(((code == OFFSET_LIMIT) & counted).sum()),
