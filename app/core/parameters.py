@@ -401,9 +401,13 @@ def _order(values: Mapping[str, Any]) -> Iterator[Problem]:
 
 
 def _tool_measured(values: Mapping[str, Any]) -> Iterator[Problem]:
-    """A tool that is measured itself belongs to a location."""
-    if values["feature"] == Feature.TOOL and values["tool_memory"] == 0:
+    """A tool that is measured itself belongs to a location, and no size after it would show that its correction has the wrong sign."""
+    if values["feature"] != Feature.TOOL:
+        return
+    if values["tool_memory"] == 0:
         yield Problem("tool_memory", "tool_measured", {})
+    if values["mode"] == Mode.AUTOMATIC and (values.get("factor") or 0) < 0:
+        yield Problem("factor", "factor_of_tool", {"value": values["factor"]})
 
 
 def _natural(values: Mapping[str, Any]) -> Iterator[Problem]:

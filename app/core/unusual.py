@@ -74,9 +74,9 @@ def _averages_never(values: Mapping[str, Any]) -> Iterator[Problem]:
 
 
 def _factor_of_tool(values: Mapping[str, Any]) -> Iterator[Problem]:
-    """Warn of a factor below 0 with which the offset of a tool that is longer, or larger, becomes smaller."""
+    """Warn of a factor below 0 with which the offset of a tool that is longer, or larger, becomes smaller: a person approves it."""
     factor = values.get("factor")
-    if values["feature"] == Feature.TOOL and values["mode"] != Mode.MEASURE_ONLY and factor is not None and factor < 0:
+    if values["feature"] == Feature.TOOL and values["mode"] == Mode.APPROVAL and factor is not None and factor < 0:
         yield Problem("factor", "factor_of_tool", {"value": factor}, warning=True)
 
 

@@ -285,8 +285,8 @@ def _of_tools(problem: Problem) -> dict[str, str]:
             "corrections: set one of the two to measure_only first, or give it another location"
         ).format(tool=data.get("tool"), other=data.get("other")),
         "factor_of_tool": _(
-            "The factor {value} is negative: the offset of a tool that is longer, or larger, than its nominal size would become "
-            "smaller. As a rule it is +1 for a length or a radius, +2 for a radius at an offset in diameter"
+            "The factor {value} is negative: a longer tool would get a smaller offset, and no size would show it. As a rule it is "
+            "+1, or +2 for a radius at an offset in diameter; if the control counts the other way, use the mode approval"
         ).format(value=f"{data.get('value', 0):+.10g}"),
         "factor_zero": _("The factor must not be 0: nothing would ever be corrected. To only measure, set R10 to 0"),
     }

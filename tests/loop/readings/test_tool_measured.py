@@ -71,6 +71,8 @@ def test_the_offset_becomes_what_the_tool_differs_by_however_often_it_is_measure
     assert presetter.read(3.0, length)["decided_deviation"] == 0.003
     replayed = presetter.call("POST", f"/characteristics/{length}/what-if", delay=0)
     assert replayed["likeness"]["replayed"]["corrections"] == replayed["truly"]["corrections"] == 3
+    for figures in (replayed["likeness"]["replayed"], replayed["truly"]):
+        assert figures["rejects"] == figures["undersize"] == 0, "sizes of tools are no parts"
 
 
 def test_a_worn_tool_is_worn_though_its_offset_has_it(presetter: Shop) -> None:
@@ -103,7 +105,18 @@ def test_parts_and_the_size_of_the_tool_do_not_correct_one_offset(setter: Shop) 
     refused = setter.call("PATCH", path, 422, parameters={"mode": "automatic", "factor": 1}, reason="tried")
     [error] = refused["errors"]
     assert (error["field"], "is corrected by" in error["message"]) == ("parameters.tool_memory", True)
-    warned = setter.call("PATCH", path, parameters={"mode": "automatic", "tool_memory": 5, "factor": -1}, reason="own")
-    assert [each["code"] for each in warned["warnings"]] == ["factor_of_tool"]
+    setter.call("PATCH", path, parameters={"mode": "automatic", "tool_memory": 5, "factor": 1}, reason="own")
     part = {"tool_memory": 5, "average_memory": 9}
     setter.call("PATCH", f"/characteristics/{setter.characteristic}", 422, parameters=part, reason="tried")
+
+
+def test_a_negative_factor_of_a_tool_needs_a_person_for_each_correction(setter: Shop) -> None:
+    """No size shows that it is wrong: the first correction of a tool that is 0.2 mm short makes a part that is 0.4 mm off."""
+    path, wrong = f"/characteristics/{setter.machine}-length", {"tool_memory": 5, "factor": -1}
+    refused = setter.call("PATCH", path, 422, parameters={"mode": "automatic"} | wrong, reason="tried")
+    [error] = refused["errors"]
+    assert (error["field"], "use the mode approval" in error["message"]) == ("parameters.factor", True)
+    warned = setter.call("PATCH", path, parameters={"mode": "approval"} | wrong, reason="this control counts down")
+    assert [each["code"] for each in warned["warnings"]] == ["factor_of_tool"]
+    answer = setter.read(-8.0, f"{setter.machine}-length")
+    assert (answer["correction"]["status"], answer["correction"]["amount"]) == ("awaiting_approval", 0.008)
