@@ -65,7 +65,7 @@ class KeyOut(BaseModel):
     role: Role | None = Field(description="null for the key of a machine.")
     created_at: datetime
     last_used_at: datetime | None = Field(description="When it last called, to about a minute; null: never.")
-    revoked_at: datetime | None
+    revoked_at: Annotated[datetime | None, Field(description="When it was revoked; null: it is valid.")]
 
 
 class NewKeyOut(BaseModel):
@@ -73,7 +73,7 @@ class NewKeyOut(BaseModel):
 
     id: int
     name: str
-    secret: str
+    secret: Annotated[str, Field(description="Sent as `Authorization: Bearer SECRET`; shown this once.")]
     role: Role | None = None
 
 

@@ -80,8 +80,8 @@ def chart_answer(chart: Chart, theme: ThemeName) -> Response:
 class WrongField(BaseModel):
     """Error of one field."""
 
-    field: str
-    message: str
+    field: Annotated[str, Field(description="Where: the field, with dots and indices.")]
+    message: Annotated[str, Field(description="What is wrong with it.")]
 
 
 class Problem(BaseModel):
@@ -89,11 +89,11 @@ class Problem(BaseModel):
 
     model_config = ConfigDict(extra="allow")
 
-    type: str = Field(examples=["urn:inband:problem:invalid"])
-    title: str
-    status: int
-    detail: str
-    errors: list[WrongField] = []
+    type: str = Field(examples=["urn:inband:problem:invalid"], description="The kind of problem, for programs.")
+    title: str = Field(description="The kind of problem, for people.")
+    status: int = Field(description="The status of the answer.")
+    detail: str = Field(description="What went wrong here.")
+    errors: list[WrongField] = Field([], description="Which fields are wrong, and why.")
     what_to_do: str | None = None
     request_id: str | None = Field(None, description="Names the request in the server's log.")
 

@@ -15,7 +15,9 @@ from app.web.fields import LARGEST_ID, Body, Reason, Text200, answer_from
 class AlarmAcknowledgeIn(Body):
     """Acknowledgement of an alarm: the action taken and a comment."""
 
-    action: Action
+    action: Annotated[
+        Action, Field(description="The answer: what was done. Which ones an alarm takes is in its page and its error.")
+    ]
     comment: Reason
     offset: Annotated[
         float | None,
@@ -56,8 +58,8 @@ class AlarmAcknowledgeIn(Body):
 class HeldCorrection(BaseModel):
     """The correction that waits for this alarm to be acknowledged."""
 
-    number: int
-    amount: float
+    number: Annotated[int, Field(description="Counts per machine; release or reject it by this number.")]
+    amount: Annotated[float, Field(description="What the offset would change by, mm.")]
 
 
 class Followed(BaseModel):
@@ -74,23 +76,33 @@ class AlarmOut(BaseModel):
 
     id: int
     kind: Annotated[str, Field(description="oversize, undersize, tool_worn, probe_fault, acceptance, offset_limit …")]
-    state: Literal["active", "acknowledged"]
+    state: Annotated[
+        Literal["active", "acknowledged"], Field(description="active: it waits for a person; acknowledged.")
+    ]
     machine: str
-    characteristic: str | None
+    characteristic: Annotated[
+        str | None, Field(description="Key of the characteristic; null: it is about a tool or the machine.")
+    ]
     tool_memory: Annotated[int | None, Field(description="R10; none if the characteristic only measures.")]
     text: Annotated[str, Field(description="What is wrong.")]
     what_to_do: str
-    raised_at: datetime
-    last_at: datetime
+    raised_at: Annotated[datetime, Field(description="When it was raised.")]
+    last_at: Annotated[datetime, Field(description="When it happened last.")]
     count: Annotated[int, Field(description="How often it has happened while the alarm is active.")]
     sequence: Annotated[int | None, Field(description="The reading that raised it.")]
     last_sequence: Annotated[int | None, Field(description="The latest reading that repeated it.")]
-    held_correction: HeldCorrection | None
-    data: dict[str, Any]
-    acknowledged_at: datetime | None
-    acknowledged_by: str | None
-    action: Action | None
-    comment: str | None
+    held_correction: Annotated[
+        HeldCorrection | None, Field(description="The correction that waits for the answer; null: none.")
+    ]
+    data: Annotated[dict[str, Any], Field(description="The values behind the text, by kind; lengths in mm.")]
+    acknowledged_at: Annotated[
+        datetime | None, Field(description="When it was answered, or ended by itself; null: it is active.")
+    ]
+    acknowledged_by: Annotated[
+        str | None, Field(description="Who answered it: a person, a key, or `inband` where it ended by itself.")
+    ]
+    action: Annotated[Action | None, Field(description="The answer: what was done.")]
+    comment: Annotated[str | None, Field(description="What the person said.")]
     outcome: Annotated[list[Followed] | None, Field(description="What followed; none while it is active.")]
 
 

@@ -37,7 +37,7 @@ class Accepted(BaseModel):
     at: datetime
     by: str
     reason: str
-    automatic: bool
+    automatic: Annotated[bool, Field(description="true: without a person, as planned.")]
 
 
 class CalibrationOut(BaseModel):
@@ -70,11 +70,11 @@ class CalibrationOut(BaseModel):
     results: Annotated[dict[str, float | None], Field(description="The same under the numbers in which L92 leaves it.")]
     touches: Annotated[list[Any], Field(description="As they came; of pairs, machine and external value.")]
     settings: Annotated[dict[str, Any], Field(description="Settings of the calibration, and further computed values.")]
-    calibrated_at: datetime
+    calibrated_at: Annotated[datetime, Field(description="When it was made.")]
     received_at: datetime
     by: str
-    key: str | None
-    accepted: Accepted | None
+    key: Annotated[str | None, Field(description="The key that it was sent with; null: none.")]
+    accepted: Annotated[Accepted | None, Field(description="By whom and when; null: it was not.")]
     warnings: Annotated[
         list[WarningOut],
         Field(
@@ -152,16 +152,18 @@ class PairOut(BaseModel):
     """The same part on the machine and on an external gauge."""
 
     id: int
-    machine_value: float
-    external_value: float
+    machine_value: Annotated[float, Field(description="Of the machine, mm.")]
+    external_value: Annotated[float, Field(description="Of the external gauge, mm.")]
     difference: Annotated[float, Field(description="Machine minus external: measuring error of the machine.")]
-    instrument: str
+    instrument: Annotated[str, Field(description="The external gauge.")]
     characteristic: str | None
-    sequence: int | None
+    sequence: Annotated[
+        int | None, Field(description="The reading that the machine's value is of; null: it was typed in.")
+    ]
     at: datetime
     by: str
     counts: Annotated[bool, Field(description="It belongs to the series of now; a series begins with each new value.")]
-    excluded: ExcludedPair | None
+    excluded: Annotated[ExcludedPair | None, Field(description="Why it does not count; null: it may.")]
     warnings: Warnings
 
 
@@ -188,7 +190,7 @@ class SuggestionOut(BaseModel):
     """The comparison of the pairs of a location."""
 
     machine: str
-    average_memory: int
+    average_memory: Annotated[int, Field(description="R11.")]
     empirical_value: Annotated[float, Field(description="The one in effect.")]
     suggested: Annotated[
         float | None,
@@ -200,7 +202,7 @@ class SuggestionOut(BaseModel):
     deviation: Annotated[float | None, Field(description="Standard deviation of the differences.")]
     low: Annotated[float | None, Field(description="Lower end of the mean's confidence interval (Student t).")]
     high: Annotated[float | None, Field(description="Upper end.")]
-    confidence: float
+    confidence: Annotated[float, Field(description="Of the interval, such as 0.95.")]
     equal: Annotated[bool, Field(description="All differences are the same: there is no interval, and no suggestion.")]
     step: Annotated[
         float | None,
@@ -234,14 +236,14 @@ class PlaceOut(BaseModel):
     machine: str
     average_memory: Annotated[int | None, Field(description="R11, whose empirical value is calibrated.")]
     tool_memory: Annotated[int | None, Field(description="R10, the probe whose offset is calibrated in the ring.")]
-    state: State
+    state: Annotated[State, Field(description="Whether a calibration is due.")]
     characteristics: Annotated[list[str], Field(description="Which characteristics use it.")]
     value: Annotated[float, Field(description="Empirical value or offset in effect.")]
     acceptance: Annotated[str, Field(description="accept or automatic.")]
-    due_parts: int | None
-    due_days: float | None
+    due_parts: Annotated[int | None, Field(description="Due after so many parts; null: not by parts.")]
+    due_days: Annotated[float | None, Field(description="Due after so many days; null: not by days.")]
     parts: Annotated[int, Field(description="Parts since the last calibration, or since the plan was made.")]
-    since: datetime | None
+    since: Annotated[datetime | None, Field(description="From when parts and days count.")]
     due_at: Annotated[datetime | None, Field(description="When it is due by days.")]
     last: Annotated[int | None, Field(description="Number of the last calibration.")]
 

@@ -99,7 +99,7 @@ class CharacteristicIn(Body):
     name: Annotated[Text200, Field(description="What people call it, as on the drawing.")]
     machine: Annotated[str, Field(description="The key of the machine that cuts and measures it; it stays for good.")]
     part: Part | None = None
-    unit: Literal["mm"] = "mm"
+    unit: Annotated[Literal["mm"], Field(description="Of its lengths.")] = "mm"
     parameters: GivenParameters
 
 
@@ -110,7 +110,7 @@ class CharacteristicChange(Body):
     name: Text200 | None = None
     machine: Annotated[str | None, Field(description="May be sent along, unchanged.")] = None
     part: Part | None = None
-    unit: Literal["mm"] | None = None
+    unit: Annotated[Literal["mm"] | None, Field(description="Of its lengths.")] = None
     parameters: GivenParameters | None = None
     parameters_version: Annotated[
         int | None, Field(strict=True, ge=1, description="The version you looked at; 409 if there is a newer one.")
@@ -121,13 +121,21 @@ class CharacteristicChange(Body):
 class CharacteristicOut(BaseModel):
     """A characteristic as it is."""
 
-    key: str
+    key: Annotated[str, Field(description="Its name in addresses and readings.")]
     name: str
     machine: str
-    part: str | None
-    unit: str
-    parameters: Annotated[dict[str, Any], Field(json_schema_extra=parameters_schema())]
-    parameters_version: int
+    part: Annotated[str | None, Field(description="The part it belongs to: drawing or article number.")]
+    unit: Annotated[str, Field(description="Of its lengths: mm.")]
+    parameters: Annotated[
+        dict[str, Any],
+        Field(
+            description="The R parameters by name, computed ones included; lengths in mm.",
+            json_schema_extra=parameters_schema(),
+        ),
+    ]
+    parameters_version: Annotated[
+        int, Field(description="Counts 1, 2, 3 …; readings keep the one they were judged by.")
+    ]
     created_at: datetime
     warnings: Warnings
 
@@ -135,11 +143,14 @@ class CharacteristicOut(BaseModel):
 class VersionOut(BaseModel):
     """One version of the parameters; readings keep the version they were judged by."""
 
-    version: int
+    version: Annotated[int, Field(description="Counts 1, 2, 3 …")]
     at: datetime
     by: str
     reason: str | None
-    parameters: Annotated[dict[str, Any], Field(json_schema_extra=parameters_schema())]
+    parameters: Annotated[
+        dict[str, Any],
+        Field(description="The R parameters by name; lengths in mm.", json_schema_extra=parameters_schema()),
+    ]
 
 
 def warnings_of(

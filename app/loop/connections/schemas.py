@@ -152,28 +152,30 @@ class HeartbeatOut(BaseModel):
 class LocationOut(BaseModel):
     """One location of the tool memory in the bridge's mapping, and its touch test."""
 
-    tool_memory: int
-    mapping: str | None
-    proved_at: datetime | None
-    offset: float | None
-    touch_test_by_page: bool = False
+    tool_memory: Annotated[int, Field(description="R10.")]
+    mapping: Annotated[str | None, Field(description="Hash of the mapping by which the bridge converts it.")]
+    proved_at: Annotated[datetime | None, Field(description="When the touch test proved this mapping; null: not yet.")]
+    offset: Annotated[float | None, Field(description="The offset that the control held last, mm; null: unknown.")]
+    touch_test_by_page: Annotated[
+        bool, Field(description="true: the bridge makes touch tests of it that are asked for here.")
+    ] = False
 
 
 class QuarantinedOut(BaseModel):
     """A reading that the server has refused."""
 
-    key: str
+    key: Annotated[str, Field(description="Key of the reading.")]
     characteristic: str | None
-    reason: str
+    reason: Annotated[str, Field(description="Why it was refused, in words.")]
     at: datetime
 
 
 class HeldBackOut(BaseModel):
     """Corrections of one tool memory that the bridge holds back: the first of them, and why."""
 
-    tool_memory: int
-    number: int
-    reason: str
+    tool_memory: Annotated[int, Field(description="R10.")]
+    number: Annotated[int, Field(description="The first of them.")]
+    reason: Annotated[str, Field(description="Why they cannot go, in words.")]
 
 
 class ConnectionOut(BaseModel):
@@ -188,21 +190,23 @@ class ConnectionOut(BaseModel):
     since: Annotated[datetime, Field(description="Since when it is in this state.")]
     detail: Annotated[str | None, Field(description="What the bridge said of it.")]
     error: Annotated[str | None, Field(description="The last error, in the bridge's words; it may be over.")]
-    error_at: datetime | None
-    version: str
-    kind: str | None
-    started_at: datetime | None
-    waiting: int
-    oldest_waiting_at: datetime | None
+    error_at: Annotated[datetime | None, Field(description="When that was, by the server's clock.")]
+    version: Annotated[str, Field(description="Version of the bridge.")]
+    kind: Annotated[str | None, Field(description="How it reaches the control: opcua, haas, dprnt, …")]
+    started_at: Annotated[datetime | None, Field(description="When the bridge started, by its clock.")]
+    waiting: Annotated[int, Field(description="Readings that wait in the bridge.")]
+    oldest_waiting_at: Annotated[
+        datetime | None, Field(description="When the oldest reading that waits came in, by the bridge's clock.")
+    ]
     oldest_waiting: Annotated[float | None, Field(description="Age of the oldest reading that waits, s.")]
     backing_up: Annotated[bool, Field(description="It waits longer than INBAND_BRIDGE_BACKLOG_AFTER, or is full.")]
-    quarantined: int
-    quarantine: list[QuarantinedOut]
-    clock_offset: float | None
-    mapping: str | None
-    hold_all: bool
-    identity: str | None
-    locations: list[LocationOut]
+    quarantined: Annotated[int, Field(description="Readings of it that the server has refused.")]
+    quarantine: Annotated[list[QuarantinedOut], Field(description="The newest of them, at most 20.")]
+    clock_offset: Annotated[float | None, Field(description="The control's clock less the bridge's, s; null: unknown.")]
+    mapping: Annotated[str | None, Field(description="Hash of the mapping by which the bridge converts.")]
+    hold_all: Annotated[bool, Field(description="true: it gives no correction to the control.")]
+    identity: Annotated[str | None, Field(description="The serial number that the control has answered.")]
+    locations: Annotated[list[LocationOut], Field(description="Locations of the tool memory that it may write to.")]
     held_back: Annotated[
         list[HeldBackOut], Field(description="Corrections that the bridge cannot give to the control.")
     ]

@@ -26,8 +26,8 @@ class FaultIn(Body):
 class FaultOut(BaseModel):
     """The alarm that a fault has raised."""
 
-    kind: Fault
-    active: bool
+    kind: Annotated[Fault, Field(description="What has failed.")]
+    active: Annotated[bool, Field(description="true: the fault is there; false: it is over.")]
     alarm: Annotated[int | None, Field(description="Number of the alarm; null for the end of a fault nobody knew.")]
     count: Annotated[int, Field(description="Reports that this alarm counts.")]
 

@@ -142,13 +142,16 @@ class MachineOut(BaseModel):
 
     model_config = ConfigDict(from_attributes=True)
 
-    key: str
-    name: str
+    key: Annotated[str, Field(description="Its name in addresses and keys.")]
+    name: Annotated[str, Field(description="What people call it.")]
     control: Control
     type: Type
-    tool_locations: int
-    average_locations: int
-    corrections_expire_after: float | None
+    tool_locations: Annotated[int, Field(description="Locations of the tool memory: R10 goes so far.")]
+    average_locations: Annotated[int, Field(description="Locations of the average memory: R11 goes so far.")]
+    corrections_expire_after: Annotated[
+        float | None,
+        Field(description="Hours after which a correction that was not applied is superseded; null: never."),
+    ]
     signal_path: SignalWay
     signal_delay: Delay
     signal_jitter: Jitter | None

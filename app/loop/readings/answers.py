@@ -81,8 +81,8 @@ class IssuedCorrection(BaseModel):
 class RaisedAlarm(BaseModel):
     """An alarm that a reading raised, or repeated while it was active."""
 
-    id: int
-    kind: str
+    id: Annotated[int, Field(description="Number of the alarm.")]
+    kind: Annotated[str, Field(description="oversize, undersize, tool_worn, probe_fault, acceptance, offset_limit …")]
 
 
 class WhySo(BaseModel):
@@ -118,8 +118,10 @@ class ReadingAnswer(BaseModel):
 
     characteristic: str
     sequence: Annotated[int, Field(description="Counts 1, 2, 3 … per characteristic, without gaps.")]
-    key: str | None
-    part: str | None
+    key: Annotated[
+        str | None, Field(description="The key that it was sent with; sent again with it, it is stored once.")
+    ]
+    part: Annotated[str | None, Field(description="Name or serial number of the part.")]
     measured: Annotated[
         float, Field(description="As the machine sent it, mm; of probed points, the value that they give.")
     ]
@@ -150,7 +152,7 @@ class ReadingAnswer(BaseModel):
         str, Field(description="none; correct: apply the correction; hold: a person decides; stop: stop the machine.")
     ]
     correction: Annotated[IssuedCorrection | None, Field(description="What this reading led to, if anything.")]
-    alarms: list[RaisedAlarm]
+    alarms: Annotated[list[RaisedAlarm], Field(description="Alarms that it raised or repeated.")]
     reason: WhySo
     parameters_version: Annotated[int, Field(description="Which version of the parameters it was judged by.")]
 
@@ -172,14 +174,14 @@ class ReadingRow(ReadingAnswer):
 class ReadingContextOut(BaseModel):
     """The circumstances of a reading, as they were sent with it; null where nothing was said."""
 
-    order: str | None = None
-    batch: str | None = None
-    nest: int | None = None
-    operator: str | None = None
+    order: Annotated[str | None, Field(description="Number of the order.")] = None
+    batch: Annotated[str | None, Field(description="Batch or charge of the material.")] = None
+    nest: Annotated[int | None, Field(description="Number of the nest, spindle or cavity.")] = None
+    operator: Annotated[str | None, Field(description="Who measured.")] = None
     machine: Annotated[str | None, Field(description="The machine that made the part, as the sender calls it.")] = None
-    gauge: str | None = None
-    comment: str | None = None
-    events: list[str] | None = None
+    gauge: Annotated[str | None, Field(description="What it was measured with.")] = None
+    comment: Annotated[str | None, Field(description="Remark.")] = None
+    events: Annotated[list[str] | None, Field(description="What happened at the part or before it.")] = None
     process: Annotated[dict[str, float] | None, Field(description="Process parameters by name.")] = None
     fields: Annotated[
         dict[str, str] | None, Field(description="Further fields of a value in an AQDEF file, by their K number.")
@@ -196,6 +198,11 @@ class ReadingDetail(ReadingRow):
             description="One list per point, each with its repeats, as they were sent; null for one that is missing."
         ),
     ]
-    machined_at: datetime | None
-    correction_in_effect: int | None
+    machined_at: Annotated[datetime | None, Field(description="When the part was cut; null: not said.")]
+    correction_in_effect: Annotated[
+        int | None,
+        Field(
+            description="Number of the last correction that was in the offset when the part was cut; null: not said."
+        ),
+    ]
     context: Annotated[ReadingContextOut | None, Field(description="Its circumstances, if any were sent.")]

@@ -51,7 +51,7 @@ class BatchCounts(BaseModel):
     stored: Annotated[int, Field(description="Readings that are new.")]
     repeated: Annotated[int, Field(description="Readings whose key was sent before; nothing happened twice.")]
     zones: Annotated[dict[str, int], Field(description="How many of the new ones were decided in each zone.")]
-    corrections: int
+    corrections: Annotated[int, Field(description="Corrections that were issued.")]
     alarms: Annotated[int, Field(description="Alarms that were raised, without repetitions.")]
     items: Annotated[
         list[ReadingAnswer] | None, Field(description="With `decisions=true`: each as a single reading is answered.")

@@ -120,7 +120,7 @@ class AqdefCharacteristic(BaseModel):
     number: Annotated[str, Field(description="K2001.")]
     name: Annotated[str, Field(description="K2002.")]
     characteristic: Annotated[str | None, Field(description="Its key here; null if it is left out.")] = None
-    created: bool = False
+    created: Annotated[bool, Field(description="true: it was set up from the file.")] = False
     stored: Annotated[int, Field(description="Readings that are new.")] = 0
     repeated: Annotated[int, Field(description="Readings that were stored before.")] = 0
     excluded: Annotated[int, Field(description="Of the new ones, those that the file marks as not valid (K0002).")] = 0
@@ -132,9 +132,11 @@ class AqdefCharacteristic(BaseModel):
 class AqdefResult(BaseModel):
     """The result of an import."""
 
-    stored: int
-    repeated: int
-    characteristics: list[AqdefCharacteristic]
+    stored: Annotated[int, Field(description="Readings that are new.")]
+    repeated: Annotated[int, Field(description="Readings that were stored before.")]
+    characteristics: Annotated[
+        list[AqdefCharacteristic], Field(description="The result of each characteristic of the file.")
+    ]
     notes: Annotated[list[str], Field(description="What to know about the file: fields, lines, times.")]
 
 

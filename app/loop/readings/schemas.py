@@ -41,7 +41,7 @@ class Context(Struct, forbid_unknown_fields=True, omit_defaults=True):
     operator: Annotated[_Text | None, Meta(description="Who measured.")] = None
     machine: Annotated[_Text | None, Meta(description="The machine that made the part, as the sender calls it.")] = None
     gauge: Annotated[_Text | None, Meta(description="What it was measured with.")] = None
-    comment: _Comment | None = None
+    comment: Annotated[_Comment | None, Meta(description="Remark.")] = None
     events: Annotated[
         Annotated[list[_Text], Meta(max_length=MOST_OF_CONTEXT)] | None,
         Meta(description="What happened at the part or before it, such as a change of the tool."),

@@ -27,12 +27,12 @@ class StatisticsOut(BaseModel):
     first_sequence: int | None = Field(description="First reading that was looked at.")
     last_sequence: int | None
     count: int = Field(description="Readings that nobody excluded, probe faults among them.")
-    excluded: int
+    excluded: int = Field(description="Readings that were taken out of the statistics.")
     probe_faults: int = Field(description="Of `count`: left out of every number but `count` and `zones`.")
-    mean: float | None
+    mean: float | None = Field(description="Mean deviation.")
     standard_deviation: float | None = Field(description="Of the sample (n - 1); null for fewer than two readings.")
-    minimum: float | None
-    maximum: float | None
+    minimum: float | None = Field(description="Smallest deviation.")
+    maximum: float | None = Field(description="Largest deviation.")
     in_tolerance: int = Field(description="Parts whose raw deviation was within the tolerance in force.")
     share_in_tolerance: float | None = Field(description="Of the parts measured: `count` less `probe_faults`.")
     corrections: int = Field(description="Readings that led to a correction.")
@@ -41,7 +41,9 @@ class StatisticsOut(BaseModel):
         description="With acceptance n of m: sections out of tolerance, the lathe line's #513; else null."
     )
     rejected_since_tool_change: int | None = Field(description="The same of all parts since the tool was changed.")
-    sections_outside_since_tool_change: int | None
+    sections_outside_since_tool_change: int | None = Field(
+        description="The same of all parts since the tool was changed."
+    )
     zones: dict[str, int] = Field(description="How many were decided in each zone.")
 
 

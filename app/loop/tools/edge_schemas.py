@@ -49,7 +49,7 @@ class SwitchedOut(BaseModel):
     machine: str
     tool: Annotated[int, Field(description="R10 of the tool that is not corrected any more.")]
     sister: Annotated[int, Field(description="R10 of the tool that goes on.")]
-    characteristics: list[str]
+    characteristics: Annotated[list[str], Field(description="Keys of the characteristics.")]
     superseded: Annotated[list[int], Field(description="Corrections that must not be applied any more.")]
     averages: Annotated[list[int], Field(description="R11 whose running average began again at 0.")]
 
@@ -64,7 +64,7 @@ class LifeOut(BaseModel):
     total: Annotated[
         float | None, Field(description="Sum of the corrections while it was in, mm; None if not on record.")
     ]
-    edge: str | None
+    edge: Annotated[str | None, Field(description="The cutting edge: D number or name.")]
     name: str | None
     actor: Annotated[str | None, Field(description="Who said that it was changed.")]
     reason: Annotated[str | None, Field(description="Why it was changed.")]
@@ -78,7 +78,7 @@ class LivesOut(BaseModel):
     usual_parts: Annotated[float | None, Field(description="Median of the parts that the edges before have cut.")]
     life_used: Annotated[float | None, Field(description="Share of the planned life that is used.")]
     parts_left: Annotated[int | None, Field(description="Parts until the planned life is reached.")]
-    lives: list[LifeOut]
+    lives: Annotated[list[LifeOut], Field(description="Newest first; the first is the present one.")]
 
 
 def lives_out(lives: Lives, machine: str) -> LivesOut:

@@ -27,9 +27,9 @@ class FetchedIn(Body):
 class FetchedOne(BaseModel):
     """A correction that was fetched."""
 
-    number: int
-    fetched_at: datetime
-    fetched_by: str
+    number: Annotated[int, Field(description="Number of the correction.")]
+    fetched_at: Annotated[datetime, Field(description="When it was first fetched.")]
+    fetched_by: Annotated[str, Field(description="Who fetched it.")]
     fetched_as: Annotated[str, Field(description="Form and check sum of the text.")]
     fetched_before: Annotated[
         bool, Field(description="It was fetched earlier already: the same text with the same number.")
@@ -51,10 +51,12 @@ class ConfirmedIn(Body):
 class ConfirmedOut(BaseModel):
     """The result of the confirmation."""
 
-    applied: list[int]
-    applied_before: list[int]
+    applied: Annotated[list[int], Field(description="Numbers of corrections that are applied now.")]
+    applied_before: Annotated[
+        list[int], Field(description="Numbers of those that were confirmed before; nothing happened twice.")
+    ]
     must_not_be_in: Annotated[list[int], Field(description="Rejected or superseded meanwhile: take them out again.")]
-    note: str | None
+    note: Annotated[str | None, Field(description="What else is to be said; null: nothing.")]
 
 
 def fetched_out(marked: list[Fetched]) -> FetchedOut:

@@ -98,12 +98,12 @@ class TouchTestOut(BaseModel):
     state_age: Annotated[float, Field(description="The same, s.")]
     question: Annotated[Question | None, Field(description="The question that waits for a person. " + QUESTION_MEANS)]
     refused: Annotated[Question | None, Field(description="The question that was answered with no.")]
-    asked_at: datetime
-    asked_by: str
+    asked_at: Annotated[datetime, Field(description="When it was asked for.")]
+    asked_by: Annotated[str, Field(description="Who asked for it.")]
     answered_by: Annotated[str | None, Field(description="Who answered or stopped it last.")]
     ended_at: Annotated[datetime | None, Field(description="null: it is open.")]
     detail: Annotated[str | None, Field(description="What came of it, in the bridge's words.")]
-    mapping: str | None
+    mapping: Annotated[str | None, Field(description="Hash of the mapping that it proves.")]
     place: Annotated[str | None, Field(description="The register at the control.")]
     unit: Annotated[Literal["mm", "inch"] | None, Field(description="Of the control's screen.")]
     before: Annotated[float | None, Field(description="Inband's offset as it was read, mm.")]

@@ -38,5 +38,5 @@ class HandMeasurementOut(BaseModel):
     by: str
     measured: Annotated[float | None, Field(description="Null where only the verdict was given.")]
     verdict: Annotated[Verdict | None, Field(description="Null where only the size was given.")]
-    comment: str | None
+    comment: Annotated[str | None, Field(description="Remark of the person.")]
     alarm: Annotated[int | None, Field(description="The alarm at which it was entered, if it was.")]
