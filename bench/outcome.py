@@ -63,7 +63,7 @@ class Process(Model):
 
     amiss: as sure as factor, sign and unit may be wrong at the control, what a correction does there; 1: what it says. swapped: tools
     whose offsets it takes for each other's. blind: the first part of which the probe does not see the first characteristic, 0: none.
-    start: deviation of the first part, mm.
+    start: deviation of the first part, mm. more: whether mail may still come, so that the program does not wait in vain.
     """
 
     sizes: dict[int, list[float]] = field(default_factory=dict)
@@ -73,6 +73,15 @@ class Process(Model):
     swapped: dict[int, int] = field(default_factory=dict)
     blind: int = 0
     start: float = 0.0
+    more: Callable[[], bool] = bool
+
+    def take_corrections(self) -> Steps:
+        """Take mail; the wait for the next, which a machine waits out, ends as soon as none can come."""
+        for _ in Model.take_corrections(self):
+            if self.idle and not self.more():
+                self.idle = False
+                return
+            yield
 
     def size(self, feature: Feature) -> float:
         """The size that is cut and measured now."""
@@ -269,7 +278,7 @@ class Play:
         [machine] = configuration_from(content, folder).machines
         store = Store(folder / "outcome.sqlite3")
         unit = Unit(machine, link_of(machine), store)
-        self.process.mail_wait = 0.5
+        self.process.mail_wait, self.process.more = PATIENCE, lambda: bool(unit.offered)
         task = asyncio.create_task(control_side.run(unit))
         try:
             async with (
