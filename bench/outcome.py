@@ -263,7 +263,7 @@ class Play:
         table |= {
             "secret": secret,
             "proof_needed": False,
-            "interval": 0.05,
+            "interval": 0.02,
             "offsets_every": 1e6,  # a tool change is told, and the new offset is set, between two looks
             "patience": PATIENCE,
             "characteristics": {str(number): key for number, key in self.keys.items()},
