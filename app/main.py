@@ -56,7 +56,7 @@ from app.loop.notes import api as notes
 from app.loop.notes import pages as note_pages
 from app.loop.programs import api as programs
 from app.loop.readings import api as readings
-from app.loop.readings import aqdef_api, results
+from app.loop.readings import aqdef_api, results, table_api
 from app.loop.readings.by_hand import api as by_hand
 from app.loop.readings.door import Directory, ReadingsDoor
 from app.loop.readings.importing import pages as import_pages
@@ -158,6 +158,7 @@ ROUTERS: tuple[APIRouter, ...] = (
     readings.push,
     reading_list.router,
     aqdef_api.router,
+    table_api.router,
     readings.router,
     by_hand.router,
     tools.router,

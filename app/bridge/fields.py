@@ -6,8 +6,18 @@ from zoneinfo import ZoneInfo
 
 from app.files.formats.cell_values import Unreadable, number
 from app.files.formats.file_times import LIVE, FileTimes
+from app.files.formats.units import LENGTHS, agreed, unit_behind
 
-FIELDS: Final = ("characteristic", "measured", "measured_at", "machined_at", "part", "correction_in_effect", "key")
+FIELDS: Final = (
+    "characteristic",
+    "measured",
+    "unit",
+    "measured_at",
+    "machined_at",
+    "part",
+    "correction_in_effect",
+    "key",
+)
 """What a column, a member, or a named group of a regular expression may be."""
 EVERY: Final = "*"
 """The name in ``characteristics`` that stands for readings that name none."""
@@ -18,7 +28,7 @@ LONGEST_TEXT: Final = 128
 class Form(NamedTuple):
     """The form of values. scale: mm in a unit of the sizes. times: as strptime has it. zone: of times without an offset.
 
-    together: what the times of a file say together.
+    together: what the times of a file say together. unit: of the sizes, where the file says it.
     """
 
     scale: float
@@ -26,6 +36,12 @@ class Form(NamedTuple):
     times: str | None = None
     zone: ZoneInfo | None = None
     together: FileTimes = LIVE
+    unit: str | None = None
+
+    def in_unit(self, *words: Any) -> "Form":
+        """The form of sizes whose column, row or cell says their unit. Raises `Unreadable`."""
+        unit = agreed(self.unit, *words)
+        return self if unit is None else self._replace(scale=LENGTHS[unit], unit=unit)
 
     def value(self, field: str, value: Any) -> Any:
         """The value of a field but ``characteristic``; None of a time that is none. Raises `Unreadable`, whose words go behind the value."""
@@ -33,10 +49,12 @@ class Form(NamedTuple):
         if field == "measured":
             if isinstance(value, bool) or not isinstance(value, int | float | str):
                 raise Unreadable("is not a number")
+            text, behind = unit_behind(text)
             size = value if isinstance(value, int | float) else number(text, self.decimal)
-            if not isfinite(size * self.scale):
+            scale = self.in_unit(behind).scale
+            if not isfinite(size * scale):
                 raise Unreadable("is not a number")
-            return round(size * self.scale, 9)
+            return round(size * scale, 9)
         if field in {"measured_at", "machined_at"}:
             at = self.together.moment(text, self.zone, self.times)
             return None if at is None else at.isoformat()

@@ -19,7 +19,7 @@ from msgspec import Struct
 
 from app.bridge.configuration import Machine, Positive
 from app.bridge.fields import EVERY, FIELDS, Form
-from app.bridge.file_rows import Fault, Found, csv_rows, ndjson_rows
+from app.bridge.file_rows import Fault, Found, csv_rows, ndjson_rows, reasons
 from app.bridge.links import Received
 from app.bridge.patterns import LONGEST_LINE, Patterns, TooSlow, check_expressions
 from app.core.ring import INCH
@@ -30,7 +30,7 @@ from app.files.formats.aqdef_times import WallClock, day_order, time_of
 from app.files.formats.cell_values import Slashed, Unreadable, slashed, zone_named
 from app.files.formats.file_times import times_of
 from app.files.formats.repeats import Repeats
-from app.files.formats.units import LENGTHS, UnknownUnit, length_unit, unit_in
+from app.files.formats.units import LENGTHS, UnknownUnit, length_unit, unit_beside, unit_in
 
 NAMES: Final = {"csv": "*.csv", "ndjson": "*.ndjson", "text": "*.txt", "aqdef": "*.df[qdxQDX]"}
 NOT_ALONE: Final = 2  # files of a pair
@@ -131,8 +131,9 @@ class Content:
         """The readings for the store; of a file that cannot be taken one entry for the quarantine says why."""
         if not self.faults:
             return [Received(entry.key, entry.body, mark=named) for entry in self.entries]
-        more = f" (and {len(self.faults) - 1} more)" if len(self.faults) > 1 else ""
-        words = f"File {named} is in the folder of failed ones, nothing of it was taken: {self.faults[0]}{more}"
+        first, *others = reasons(self.faults)
+        more = f" (and {len(others)} more)" if others else ""
+        words = f"File {named} is in the folder of failed ones, nothing of it was taken: {first}{more}"
         return [Received(f"{machine}:file:{self.digest[:32]}", {"file": named}, fault=words, mark=named)]
 
 
@@ -240,7 +241,7 @@ class _Reader:
         column = columns.get("measured_at", "")
         written = (str(row.get(column) or "") for _line, row in table if isinstance(row, Mapping))
         self.form = self.form._replace(together=times_of(written, self.settings.times).live)
-        scales: dict[str, float] = {}
+        units: dict[str, str | None] = {}
         for line, row in table:
             if isinstance(row, Fault):
                 self.content.faults.append(row)
@@ -249,13 +250,15 @@ class _Reader:
                 self._remark(row)
                 continue
             fields = {name: row[column] for name, column in columns.items() if column in row}
+            if "unit" not in self.settings.columns:
+                fields["unit"] = unit_beside(row)
             sizes = (
                 [columns["measured"]]
                 if "measured" in fields
                 else [name for name in self.machine.characteristics if name in row]
             )
             try:
-                scales |= {column: self._scale_of(column) for column in sizes if column not in scales}
+                units |= {column: unit_in(column) for column in sizes if column not in units}
             except UnknownUnit as error:
                 reason = (
                     f"the header names the unit {error.word}, which is no length that is known ({', '.join(LENGTHS)}): "
@@ -265,7 +268,7 @@ class _Reader:
                 return
             if "measured" in fields:
                 name = str(fields.get("characteristic", EVERY)).strip()
-                self._take(line, name, fields, row, scales[columns["measured"]])
+                self._take(line, name, fields, row, units[columns["measured"]])
                 continue
             if not sizes:
                 reason = "has neither a column measured nor one that characteristics names."
@@ -273,12 +276,7 @@ class _Reader:
                 return
             for name in sizes:
                 if row[name] not in {None, ""} and str(row[name]).strip():
-                    self._take(line, name, fields | {"measured": row[name]}, row, scales[name])
-
-    def _scale_of(self, column: str) -> float:
-        """Millimetres in the unit of a column: that of its header, else the machine's. Raises `UnknownUnit`."""
-        unit = unit_in(column)
-        return self.scale if unit is None else LENGTHS[unit]
+                    self._take(line, name, fields | {"measured": row[name]}, row, units[name])
 
     # --- text protocols
 
@@ -371,7 +369,7 @@ class _Reader:
             try:
                 body["measured_at"] = (clock.moment(value.at) if clock else value.at).isoformat()
             except Unreadable as error:
-                self._fault(item.line, "K0004", f"{item.fields.get('K0004', '')!r} {error}.")
+                self._fault(item.line, "K0004", f"{error}.", item.fields.get("K0004", ""))
                 return
         told = item.fields
         if value.at is None and value.batch and not value.part:  # a batch is many parts: the next one may be as large
@@ -388,15 +386,16 @@ class _Reader:
 
     def _remark(self, remark: aqdef.Remark) -> None:
         if remark.wrong:
-            self._fault(remark.line, remark.field, f"{remark.value!r} {remark.reason}")
+            self._fault(remark.line, remark.field, remark.reason, remark.value)
         else:
             self.remarks.add(remark)
 
     # --- one reading
 
     def _take(
-        self, line: int, name: str, fields: Mapping[str, Any], raw: Mapping[str, Any], scale: float | None = None
+        self, line: int, name: str, fields: Mapping[str, Any], raw: Mapping[str, Any], unit: str | None = None
     ) -> None:
+        """Take a reading. unit: that the header of its column names."""
         key = self.machine.characteristics.get(name)
         if key is None:
             self._nobody(line, name)
@@ -406,10 +405,15 @@ class _Reader:
             self._remark(aqdef.Remark(line, "", name, "is marked as missing; passed over"))
             return
         body: dict[str, Any] = {"characteristic": key}
-        form = self.form if scale is None else self.form._replace(scale=scale)
+        try:
+            form = self.form.in_unit(unit, fields.get("unit"))
+        except Unreadable as error:
+            hint = "" if fields.get("unit") is None else ' If this column holds no units, set columns.unit = "".'
+            self._fault(line, self.settings.columns.get("unit", "unit"), f"{error}.{hint}")
+            return
         own = None
         for field_, value in fields.items():
-            if field_ == "characteristic" or value is None or (value == "" and field_ != "measured"):
+            if field_ in {"characteristic", "unit"} or value is None or (value == "" and field_ != "measured"):
                 continue
             try:
                 if field_ == "key":
@@ -418,7 +422,7 @@ class _Reader:
                     body[field_] = read
             except Unreadable as error:
                 column = self.settings.columns.get(field_, field_ if name == EVERY or "measured" in fields else name)
-                self._fault(line, column, f"{str(value)[:40]!r} {error}.")
+                self._fault(line, column, f"{error}.", str(value)[:40])
                 return
         self._add(line, name, body, raw, own)
 
@@ -456,5 +460,5 @@ class _Reader:
             )
             self._fault(line, "", f'{said}. Add it there, or set others = "skip".')
 
-    def _fault(self, line: int | None, field_: str, reason: str) -> None:
-        self.content.faults.append(Fault(line, field_, reason))
+    def _fault(self, line: int | None, field_: str, reason: str, value: str = "") -> None:
+        self.content.faults.append(Fault(line, field_, reason, value))

@@ -7,21 +7,38 @@ from typing import Any, Final, NamedTuple
 
 from app.bridge.json_text import read_json
 from app.files.formats import aqdef, delimited
+from app.files.formats.repeats import Repeats
 
 TITLES: Final = 50  # rows in which the names of the columns are looked for
 
 
 class Fault(NamedTuple):
-    """Something for which a file cannot be taken: line where it is known, field or column, and the reason with what to do."""
+    """Something for which a file cannot be taken: line where it is known, field or column, and the reason with what to do.
+
+    value: as it is written, where the reason is about one.
+    """
 
     line: int | None
     field: str
     reason: str
+    value: str = ""
 
     def __str__(self) -> str:
-        """Line, field, reason."""
+        """Line, field, value, reason."""
         where = ", ".join(([f"line {self.line}"] if self.line else []) + ([self.field] if self.field else []))
-        return f"{where}: {self.reason}" if where else self.reason
+        words = f"{self.value!r} {self.reason}" if self.value else self.reason
+        return f"{where}: {words}" if where else words
+
+
+def reasons(faults: Iterable[Fault]) -> list[str]:
+    """Sentences on faults, each reason once with its first lines and their count; those of the whole file come first."""
+    whole, lines = dict[str, None](), Repeats()
+    for fault in faults:
+        if fault.line:
+            lines.add(aqdef.Remark(fault.line, fault.field, fault.value, fault.reason))
+        else:
+            whole[str(fault)] = None
+    return [*whole, *lines.sentences()]
 
 
 Found = Mapping[str, Any] | Fault | aqdef.Remark
@@ -35,14 +52,14 @@ def csv_rows(
     try:
         delimiter = delimited.BLANKS if said == "blanks" else said or delimited.delimiter_of(path, encoding)
         rows = delimited.rows(path, encoding, delimiter)
-        header = _header(rows, set(columns.values()))
+        header = _header(rows, set(filter(None, columns.values())))
         if header is None:
             return
         line = header.line
         names = [name.strip().lstrip("\ufeff") for name in header.cells]
         for name in sorted({name for name in names if name and names.count(name) > 1}):
             yield line, Fault(line, name, "is the name of several columns; give each its own.")
-        wanted = set(columns.values()) - set(names)
+        wanted = set(filter(None, columns.values())) - set(names)
         for name in sorted(wanted):
             yield line, Fault(line, name, f"is no column of this file; it has {', '.join(names)}.")
         if wanted:

@@ -8,6 +8,7 @@ from typing import Any, Final, NamedTuple
 from app.bridge.fields import EVERY, Form
 from app.bridge.json_text import read_json
 from app.files.formats.cell_values import Unreadable
+from app.files.formats.units import unit_beside
 
 KINDS: Final[dict[str, tuple[type, ...]]] = {
     "characteristic": (str, int),
@@ -127,9 +128,14 @@ def foreign_readings(
         return [Found(None, None, {}, str(error))]
     told = {field: value for field, path in fields.items() if (value := member(content, path)) is not None}
     if "measured" in fields:
-        sizes = [(str(told.get("characteristic", EVERY)), told.pop("measured", None))]
+        path = fields["measured"]
+        sizes = [(str(told.get("characteristic", EVERY)), told.pop("measured", None), _unit_beside(content, path))]
     else:
-        sizes = [(name, size) for name in characteristics if (size := member(content, name)) is not None]
+        sizes = [
+            (name, size, _unit_beside(content, name))
+            for name in characteristics
+            if (size := member(content, name)) is not None
+        ]
     if not sizes:
         return [Found(None, None, {}, "The message has none of the members that characteristics names.")]
     return list(_mapped(payload, machine, told, sizes, characteristics, form, alone="measured" in fields))
@@ -139,23 +145,25 @@ def _mapped(
     payload: bytes,
     machine: str,
     told: Mapping[str, Any],
-    sizes: list[tuple[str, Any]],
+    sizes: list[tuple[str, Any, Any]],
     characteristics: Mapping[str, str],
     form: Form,
     *,
     alone: bool,
 ) -> Iterator[Found]:
     said = told.get("key")
-    for name, size in sizes:
+    for name, size, unit in sizes:
         if (key := characteristics.get(name)) is None:
             yield Found(None, None, {}, f"{name!r} is not named in machine.{machine}.characteristics. Add it there.")
             continue
         body: dict[str, Any] = {"characteristic": key}
+        wrong = "unit"
         try:
+            own = form.in_unit(told.get("unit", unit))
             for field, value in {**told, "measured": size}.items():
-                if field not in {"characteristic", "key"}:
+                if field not in {"characteristic", "unit", "key"}:
                     wrong = f"{field} = {json.dumps(value, ensure_ascii=False)[:40]}"
-                    if (read := form.value(field, "" if value is None else value)) is not None:
+                    if (read := own.value(field, "" if value is None else value)) is not None:
                         body[field] = read
         except Unreadable as error:
             yield Found(None, None, {}, f"{wrong} {error}.")
@@ -171,6 +179,16 @@ def _mapped(
         if len(whole) > LONGEST_KEY:
             whole = f"{machine}:{_digest(whole.encode())}"
         yield Found(whole, said if alone and said is not None else whole, body)
+
+
+def _unit_beside(content: Any, path: str) -> Any:
+    """The unit that stands beside a size in its object, else in the nearest one around it."""
+    while path:
+        path = "" if path in content else path.rpartition(".")[0]
+        around = member(content, path) if path else content
+        if isinstance(around, dict) and (unit := unit_beside(around)) is not None:
+            return unit
+    return None
 
 
 def _digest(told: bytes) -> str:

@@ -213,6 +213,7 @@ def preview(
 ) -> None:
     """Say what each line of a file would become. Nothing is sent, moved or stored. For machines of kind folder."""
     from app.bridge.file_content import files_of, read_content
+    from app.bridge.file_rows import reasons
     from app.files.formats.delimited import Unusable
 
     configuration = _configuration(config)
@@ -223,6 +224,8 @@ def preview(
         content = read_content(chosen, files_of(file))
     except (OSError, Unusable) as error:
         raise InbandError(f"{file} cannot be read: {error}.") from error
+    for reason in reasons(content.faults):
+        say(f"✗ {reason}", style="bold red")
     for entry in content.entries:
         words = "\t".join(f"{name}={value}" for name, value in entry.body.items())
         typer.echo(f"line {entry.line}\t{entry.name}\t{words}")
@@ -230,8 +233,6 @@ def preview(
         say(remark)
     if content.skipped:
         say(f"{content.skipped} readings are passed over.")
-    for fault in content.faults:
-        say(f"✗ {fault}", style="bold red")
     if content.faults:
         say("The file would go to the folder of failed files; nothing of it would be stored.")
         raise typer.Exit(1)

@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from app.loop.readings.importing.cells import Flaw
     from app.loop.readings.importing.history import Flawed, Summary
     from app.loop.readings.importing.layout import Layout, Wishes
-    from app.loop.readings.importing.wide import ColumnResult
+    from app.loop.readings.importing.wide import Column, ColumnResult
 
 SINCE, UNTIL = (
     "Measured at this moment or later; a day begins at midnight.",
@@ -134,8 +134,10 @@ DayFirst = Annotated[
         show_default="dates that could be either are refused",
     ),
 ]
-
-
+CreateMissing = Annotated[
+    bool, typer.Option("--create-missing", envvar="INBAND_CREATE_MISSING", help="Set up what is not here yet.")
+]
+OnMachine = Annotated[str | None, typer.Option(envvar="INBAND_MACHINE", help="On which machine it is set up.")]
 Columns = Annotated[
     str,
     typer.Option(
@@ -163,13 +165,8 @@ def import_file(
     first_line: FirstLine = None,
     last_line: LastLine = None,
     missing: Missing = "",
-    create_missing: Annotated[
-        bool,
-        typer.Option("--create-missing", envvar="INBAND_CREATE_MISSING", help="Of AQDEF: set up what is not here yet."),
-    ] = False,
-    machine: Annotated[
-        str | None, typer.Option(envvar="INBAND_MACHINE", help="Of AQDEF: on which machine it is set up.")
-    ] = None,
+    create_missing: CreateMissing = False,
+    machine: OnMachine = None,
     day_first: DayFirst = None,
     live: Annotated[
         bool, typer.Option("--live", envvar="INBAND_LIVE", help="Decide as if they came in now: corrections, alarms.")
@@ -224,7 +221,9 @@ def import_file(
         try:
             if not characteristic:
                 several = columns_said(columns, layout) or columns_known(database, layout)
-                results = import_wide(database, several, path, layout, unit=wishes.unit, **how)
+                if create_missing:
+                    several, machine = _with_missing(database, several, layout, machine)
+                results = import_wide(database, several, path, layout, unit=wishes.unit, machine=machine, **how)
             else:
                 summary = import_readings(database, characteristic, path, layout, live=live, **how)
                 results = [ColumnResult(Column(0, characteristic), summary)]
@@ -233,14 +232,32 @@ def import_file(
             raise typer.Exit(1) from None
     with in_zone(_zone(timezone)):
         _sum_up_all(results, live=live, dry_run=dry_run)
-    if any(trouble is not None for _column, _result, trouble in results):
+    if any(result.trouble is not None for result in results):
         raise typer.Exit(1)
+
+
+def _with_missing(
+    database: Any, chosen: "list[Column]", layout: "Layout", machine: str | None
+) -> "tuple[list[Column], str | None]":
+    """The columns, with one for each characteristic that the rows describe and nobody has chosen; and its machine."""
+    from app.loop.readings.importing.wide import with_missing
+
+    if not layout.names:
+        reason = _("Only AQDEF, and tables in which each row names its characteristic, say what is to be set up.")
+        raise typer.BadParameter(reason, param_hint="--create-missing")
+    columns, left_out, machine = with_missing(database, chosen, layout, machine)
+    for each in left_out:
+        say(_("{title}: left out: {reason}.").format(title=each.title, reason=each.not_new), style="yellow")
+    return columns, machine
 
 
 def _sum_up_all(results: "Iterable[ColumnResult]", *, live: bool, dry_run: bool) -> None:
     from app.loop.readings.importing.history import Flawed
 
-    for column, result, trouble in results:
+    for column, result, trouble, created in results:
+        if created:
+            text = _("{key} is set up with the drawing's limits; it measures only. Check its zones before it corrects.")
+            say(text.format(key=column.characteristic))
         if result is not None:
             _sum_up(result, column.characteristic, live=live, dry_run=dry_run)
         elif isinstance(trouble, Flawed):

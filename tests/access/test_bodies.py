@@ -100,7 +100,7 @@ def test_a_bound_device_sends_forms_and_no_files(server: InProcess, shop: Shop) 
     assert too_much.read <= 64_000 + PIECE
 
 
-@pytest.mark.parametrize("path", ["/import", "/api/v1/readings/aqdef"])
+@pytest.mark.parametrize("path", ["/import", "/api/v1/readings/aqdef", "/api/v1/readings/table"])
 def test_sixty_four_megabytes_are_for_those_who_may_import(server: InProcess, shop: Shop, path: str) -> None:
     viewer, engineer = ({"Authorization": f"Bearer {server.key(role)}"} for role in ("viewer", "engineer"))
     machine = {"Authorization": f"Bearer {shop.machine_key}"}

@@ -67,6 +67,16 @@ GAUGE: dict[str, Any] = {
 }
 BODIES: dict[str, dict[str, Any]] = {
     "POST /api/v1/readings/aqdef": {"name": "bad.dfq", "content": AQDEF},
+    "POST /api/v1/readings/table": {
+        "name": "bad.csv",
+        "content": "Time;Value\n2026-11-21T08:15:02Z;40.001\n",
+        "characteristic": "{characteristic}",
+        "map": {"measured": "Value"},
+        "unit": "mm",
+        "decimal": ".",
+        "missing": ["---"],
+        "dry_run": True,
+    },
     "POST /api/v1/machines": {"key": "mill-bad", "name": "Mill", "control": "heidenhain"},
     "PATCH /api/v1/machines/{machine}": {"name": "Lathe", "control": "fanuc", "corrections_expire_after": 8.0},
     "POST /api/v1/machines/{machine}/keys": {"name": "Second control"},

@@ -25,7 +25,7 @@ from typing import Final, NamedTuple, TypeVar
 
 from app.bridge.configuration import Machine
 from app.bridge.file_content import NAMES, NOT_ALONE, Content, Settings, read_content
-from app.bridge.file_rows import Fault
+from app.bridge.file_rows import Fault, reasons
 from app.bridge.links import STOPPING, Clock, ControlAway, Decided, Misconfigured, Order, Outcome, Position, Received
 from app.bridge.moments import learn_ahead
 from app.bridge.plain_files import NotPlain, is_plain, read_plain, write_new
@@ -38,7 +38,7 @@ IDENTITY: Final = "inband-identity.txt"
 UNFINISHED: Final = (".tmp", ".part", ".partial", ".filepart", ".crdownload", ".why.txt")
 SAME_FOR: Final = 0.9  # of the time between two looks
 LOCKED_FOR: Final = 60.0  # s until it is said
-MOST_FAULTS: Final = 100
+MOST_REASONS: Final = 100
 
 
 class Seen(NamedTuple):
@@ -367,7 +367,7 @@ class Folder:
         if content.faults:
             text = folder / f"{_numbered(seen.paths[-1], count)}.why.txt"
             write_new(text, _why(seen, content, self.path).encode())
-            log.warning("%s: file %s has failed: %s", self.machine.key, seen.name, content.faults[0])
+            log.warning("%s: file %s has failed: %s", self.machine.key, seen.name, reasons(content.faults)[0])
         for path in seen.paths:
             path.rename(folder / _numbered(path, count))
 
@@ -377,14 +377,15 @@ def _numbered(path: Path, count: int) -> str:
 
 
 def _why(seen: Seen, content: Content, folder: Path) -> str:
+    why = reasons(content.faults)
     lines = [
         f"Inband could not take this file ({seen.name}). Nothing of it was stored.",
         f"{datetime.now().astimezone().isoformat(timespec='seconds')}",
         "",
-        *(f"- {fault}" for fault in content.faults[:MOST_FAULTS]),
+        *(f"- {reason}" for reason in why[:MOST_REASONS]),
     ]
-    if len(content.faults) > MOST_FAULTS:
-        lines.append(f"- and {len(content.faults) - MOST_FAULTS} more")
+    if len(why) > MOST_REASONS:
+        lines.append(f"- and {len(why) - MOST_REASONS} more")
     lines += [
         "",
         f"What to do: correct the file, or the configuration of the bridge, and put the file back into {folder}.",

@@ -153,14 +153,16 @@ class TextLink:
             said = f"names no characteristic that {where} has" if name == EVERY else f"{name!r} is not named in {where}"
             return self._refused(line, f'{said}. Add it there, or set others = "skip".')
         body: dict[str, Any] = {"characteristic": key}
-        for field, value in fields.items():
-            if field in {"characteristic", "key"} or (value == "" and field != "measured"):
-                continue
-            try:
-                if (read := self._form.value(field, value)) is not None:
+        field, value = "unit", fields.get("unit", "")
+        try:
+            form = self._form.in_unit(value)
+            for field, value in fields.items():
+                if field in {"characteristic", "unit", "key"} or (value == "" and field != "measured"):
+                    continue
+                if (read := form.value(field, value)) is not None:
                     body[field] = read
-            except Unreadable as error:
-                return self._refused(line, f"{field} {value[:40]!r} {error}.")
+        except Unreadable as error:
+            return self._refused(line, f"{field} {value[:40]!r} {error}.")
         if "key" in fields:
             told = [fields["key"], name]
         elif body.keys() & {"measured_at", "machined_at", "part"}:

@@ -7,7 +7,7 @@ from typing import cast
 from zoneinfo import ZoneInfo
 
 from app.files.formats.cell_values import DayOrder, Unreadable, at_hour, never_was
-from app.files.formats.file_times import DEFAULTS
+from app.files.formats.file_times import DEFAULTS, is_zeros
 from app.language.i18n import _
 
 _DATE = re.compile(
@@ -33,6 +33,8 @@ def time_of(text: str, order: DayOrder | None = None) -> datetime:
     >>> time_of("26-11-23.6:05").isoformat(), time_of("2026-11-23T06:05:00.5+01:00").isoformat()
     ('2026-11-23T06:05:00', '2026-11-23T06:05:00.500000+01:00')
     """
+    if is_zeros(text):
+        return datetime.min  # noqa: DTZ901 - a day of `DEFAULTS`: no time
     match = _DATE.fullmatch(text.strip())
     if match is None:
         raise Unreadable(_("is not a time; AQDEF writes it as 23.11.2026/06:05:00"))

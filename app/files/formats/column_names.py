@@ -1,9 +1,19 @@
 """Names of columns that people give them, by the field that they mean: in English, German, Serbian, Slovene and Russian."""
 
+UPPER_LIMITS = (
+    "upper limit", "usl", "upper spec", "upper specification limit", "max size", "obere grenze", "oberer grenzwert", "ogw",
+    "gornja granica", "zgornja meja", "верхний предел",
+)  # fmt: skip
+LOWER_LIMITS = (
+    "lower limit", "lsl", "lower spec", "lower specification limit", "min size", "untere grenze", "unterer grenzwert", "ugw",
+    "donja granica", "spodnja meja", "нижний предел",
+)  # fmt: skip
+"""Names of columns that hold a limit as a size; *upper* and *lower* by any other name are deviations from the nominal size."""
+
 # Folded: lower case, no accents, no unit. The first of a line is the field's own name.
 NAMES: dict[str, tuple[str, ...]] = {
     "measured": (
-        "measured", "measured value", "measurement", "value", "actual", "actual value", "size", "diameter",
+        "measured", "measured value", "measurement", "meas", "value", "actual", "actual value", "size", "diameter",
         "messwert", "wert", "istwert", "ist", "istmass", "mass", "gemessen", "durchmesser",
         "izmereno", "izmerena vrednost", "vrednost", "mera", "izmerjeno", "izmerjena vrednost", "meritev", "mere",
         "precnik", "premer", "пречник", "диаметр",
@@ -27,6 +37,22 @@ NAMES: dict[str, tuple[str, ...]] = {
     "characteristic": (
         "characteristic", "characteristic name", "feature", "feature name", "merkmal", "merkmalsname", "karakteristika",
         "znacilnost", "карактеристика", "характеристика",
+    ),
+    "unit": (
+        "unit", "units", "uom", "einheit", "masseinheit", "jedinica", "merna jedinica", "enota", "merska enota",
+        "единица", "единица измерения", "ед изм", "јединица",
+    ),
+    "nominal": (
+        "nominal", "nominal value", "nominal size", "soll", "sollwert", "sollmass", "nennmass", "nominalna vrednost", "nazivna mera",
+        "номинал", "номинальное значение",
+    ),
+    "upper": (
+        "uppertol", "upper tol", "upper tolerance", "upper deviation", "+tol", "plus tol", "oberes abmass", "obere toleranz",
+        "gornje odstupanje", "zgornje odstopanje", "верхнее отклонение", *UPPER_LIMITS,
+    ),
+    "lower": (
+        "lowertol", "lower tol", "lower tolerance", "lower deviation", "unteres abmass", "untere toleranz",
+        "donje odstupanje", "spodnje odstopanje", "нижнее отклонение", *LOWER_LIMITS,
     ),
     "key": ("key", "schlussel", "kljuc", "ключ", "кључ"),
     "correction_in_effect": ("correction in effect",),

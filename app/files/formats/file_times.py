@@ -4,6 +4,7 @@ Which comes first in dates with strokes, day or month, is said by a date that ca
 others, or one that programs write where they have none, is no time.
 """
 
+import re
 from collections.abc import Callable, Iterable
 from datetime import date, datetime, time, timedelta
 from typing import NamedTuple
@@ -19,6 +20,16 @@ DEFAULTS = frozenset(
 MIDNIGHTS = frozenset({date(2000, 1, 1)})
 """Days of which only the midnight is one: a clock that was never set begins there."""
 FAR = timedelta(days=366)
+_ZEROS = re.compile(r"0{1,4}([./-])0{1,2}\1 ?0{1,4}\.?(?:[/ .,T]+0{1,2}(?::0{1,2}){1,2}(?:[.,]0+)?)?[/Zz]?")
+
+
+def is_zeros(text: str) -> bool:
+    """Tell of a date of nothing but zeros, as databases have it for none.
+
+    >>> is_zeros("00.00.0000"), is_zeros("0000-00-00 00:00:00"), is_zeros("00:00:00")
+    (True, True, False)
+    """
+    return _ZEROS.fullmatch(text.strip()) is not None
 
 
 def default_of(at: datetime) -> date | None:
@@ -30,25 +41,27 @@ def default_of(at: datetime) -> date | None:
 class FileTimes(NamedTuple):
     """Common properties of the times of a file. order: of day and month. dated: there are times at all.
 
-    absent: days of programs that lie far from every time of the file, so that they mean no time.
+    absent: days of programs that lie far from every time of the file, so that they mean no time. nothing: all that was looked
+    at is empty, or such a day.
     """
 
     order: DayOrder | None = None
     dated: bool = False
     absent: frozenset[date] = frozenset()
+    nothing: bool = False
 
     def moment(self, text: str, zone: ZoneInfo | None, pattern: str | None = None) -> datetime | None:
         """The time in a cell; None where it has none. Raises `Unreadable`."""
-        if self.dated and not text.strip():
+        if (self.dated and not text.strip()) or is_zeros(text):
             return None
         if self.settled(naive(text, pattern, self.order)) is None:
             return None
         return moment(text, zone, pattern, order=self.order)
 
     def settled(self, at: datetime) -> datetime | None:
-        """The time, as a file writes it; None where it means none. Raises `Unreadable` where the file has no other."""
+        """The time, as a file writes it; None where it means none. Raises `Unreadable` where nobody can tell."""
         day = default_of(at)
-        if day is not None and not self.dated:
+        if day is not None and not self.dated and day not in self.absent:
             raise Unreadable(
                 _("is what programs write where they have no time; correct it, or leave the column of times out")
             )
@@ -71,10 +84,16 @@ def times_of(texts: Iterable[str], pattern: str | None = None, read: Read | None
     'month_first'
     >>> [day.year for day in sorted(times_of(["7.5.1999", "1.1.1970 00:00:00"]).absent)]
     [1, 1899, 1899, 1900, 1904, 1970]
+    >>> times_of(["1.1.1970 01:00:00", "", "1.1.1970 01:00:00"]).nothing
+    True
     """
     orders: set[DayOrder] = set()
     days: set[date] = set()
+    defaults: dict[date, set[time]] = {}
+    unread = False
     for text in texts:
+        if not text.strip() or is_zeros(text):
+            continue
         stroke = None if pattern else slashed(text)
         if stroke in (Slashed.DAY_FIRST, Slashed.MONTH_FIRST):
             orders.add("day_first" if stroke is Slashed.DAY_FIRST else "month_first")
@@ -82,13 +101,17 @@ def times_of(texts: Iterable[str], pattern: str | None = None, read: Read | None
             order: DayOrder = "month_first" if stroke is Slashed.MONTH_FIRST else "day_first"
             at = naive(text, pattern, order) if read is None else read(text, order)
         except Unreadable:
+            unread = True
             continue
-        if default_of(at) is None:
+        if (default := default_of(at)) is None:
             days.add(at.date())
+        else:
+            defaults.setdefault(default, set()).add(at.time())
     if not days:
-        return FileTimes(_only(orders))
-    absent = (day for day in DEFAULTS | MIDNIGHTS if not _within(day, min(days), max(days)))
-    return FileTimes(_only(orders), dated=True, absent=frozenset(absent))
+        absent = DEFAULTS - {day for day, times in defaults.items() if len(times) > 1}
+        return FileTimes(_only(orders), absent=absent, nothing=not unread and absent >= defaults.keys())
+    far = (day for day in DEFAULTS | MIDNIGHTS if not _within(day, min(days), max(days)))
+    return FileTimes(_only(orders), dated=True, absent=frozenset(far))
 
 
 def _only(orders: set[DayOrder]) -> DayOrder | None:

@@ -4,6 +4,7 @@ openpyxl reads row by row, so that a long sheet needs no more memory than a shor
 """
 
 import errno
+import re
 import zlib
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
@@ -15,6 +16,7 @@ from typing import Any
 from zipfile import BadZipFile, ZipFile
 
 from app.files.formats.delimited import Unusable
+from app.files.formats.units import length_unit
 from app.language.i18n import _
 
 ENDINGS = {".xlsx", ".xlsm"}
@@ -31,6 +33,8 @@ _BROKEN = (
 )  # fmt: skip
 """Errors of openpyxl, and of what it calls, on files that are no workbooks."""
 _OF_THE_DISK = {errno.EFBIG, errno.ENOSPC, errno.EDQUOT}
+_LITERAL = re.compile(r'"([^"]*)"|\\(.)')  # in a number format
+_OWN_FORMATS = 164  # formats of a workbook's own are counted from here on
 _PLAIN = str.maketrans({"\t": " ", "\r": " ", "\n": " "})
 Spend = Callable[[int], None]
 
@@ -120,7 +124,7 @@ def _write(sheet: Any, target: Path, spend: Spend) -> Path | None:
 
     A row ends with its last filled cell: what the file says of its width is often that of a formatted column.
     """
-    book, last, filled = sheet.parent, 0, False
+    book, last, filled, units = sheet.parent, 0, False, _Units()
     with sheet._get_source() as source, target.open("wb") as file:  # noqa: SLF001 - openpyxl reads it no other way
         parser = _parser()(
             source,
@@ -139,7 +143,7 @@ def _write(sheet: Any, target: Path, spend: Spend) -> Path | None:
                 )
             if number <= last:
                 continue
-            line = _line({cell["column"] - 1: _text(cell["value"]) for cell in cells})
+            line = _line({cell["column"] - 1: _text(cell["value"]) + units(book, cell) for cell in cells})
             filled = filled or bool(line)
             content = b"\n" * (number - last - 1) + line.encode() + b"\n"
             spend(len(content))
@@ -149,6 +153,25 @@ def _write(sheet: Any, target: Path, spend: Spend) -> Path | None:
         target.unlink()
         return None
     return target
+
+
+class _Units:
+    """Units of length that number formats show behind their numbers, such as ``0.0000" in"``; none for mm, as numbers are."""
+
+    def __init__(self) -> None:
+        self._of_styles: dict[int, str] = {}
+
+    def __call__(self, book: Any, cell: Mapping[str, Any]) -> str:
+        """The unit behind a cell, with a blank."""
+        value, style = cell["value"], cell["style_id"]
+        if not style or isinstance(value, bool) or not isinstance(value, int | float):
+            return ""
+        if style not in self._of_styles:
+            format_ = book._cell_styles[style].numFmtId - _OWN_FORMATS  # noqa: SLF001 - openpyxl tells it no other way
+            code = book._number_formats[format_] if format_ >= 0 else ""  # noqa: SLF001
+            word = "".join(quoted or escaped for quoted, escaped in _LITERAL.findall(code.partition(";")[0])).strip()
+            self._of_styles[style] = f" {word}" if length_unit(word) not in {None, "mm"} else ""
+        return self._of_styles[style]
 
 
 def _line(cells: Mapping[int, str]) -> str:

@@ -1,7 +1,13 @@
 """Units of length, as files and headers of columns name them: one table for every door, so that no size becomes a silent mm."""
 
 import re
-from typing import Final, Literal, get_args
+from collections.abc import Mapping
+from functools import lru_cache
+from typing import Any, Final, Literal, get_args
+
+from app.files.formats.cell_values import Unreadable, folded
+from app.files.formats.column_names import NAMES
+from app.language.i18n import _
 
 Unit = Literal["mm", "um", "nm", "cm", "m", "inch", "mil", "tenth", "uin"]
 LENGTHS: Final[dict[str, float]] = {
@@ -36,6 +42,9 @@ _WORDS: Final[dict[str, str]] = {
 _ONLY_AS_WRITTEN: Final = {"nm": {"nm"}, "m": {"m"}, "mm": {"mm", "MM"}}
 """Units whose other cases are something else: Nm is a torque, M a million, Mm a million metres."""
 _BRACKETS: Final = re.compile(r"\[([^\[\]]*)\]|\(([^()]*)\)|<([^<>]*)>")
+_BEHIND: Final = re.compile(r"(.*\d[.,]?)\s*([^\d\s.,]{1,12})")
+LONGEST_SIZE: Final = 400  # characters; what is longer is no size
+_LARGEST: Final = 1e300  # what is larger would become infinite
 _AT_END: Final = re.compile(r"[_ ](mm|MM|[uµμ]m|inch)$")
 _NO_UNITS: Final = (
     {*"xyzabcuvwijkrdln", "id", "max", "min", "avg", "mean", "med", "std", "ist", "soll", "act", "nom", "dia", "abs", "rel"}
@@ -86,6 +95,69 @@ def unit_in(header: str) -> str | None:
     if unknown is not None:
         raise UnknownUnit(unknown)
     return length_unit(match[1]) if (match := _AT_END.search(header)) else None
+
+
+def unit_behind(text: str) -> tuple[str, str]:
+    """A size and the unit of length behind it; no unit where none that is known stands there.
+
+    >>> unit_behind("12,003 mm"), unit_behind('0.4724"'), unit_behind("12.003"), unit_behind("25 Nm")
+    (('12,003', 'mm'), ('0.4724', '"'), ('12.003', ''), ('25 Nm', ''))
+    """
+    match = _BEHIND.fullmatch(text.strip()) if len(text) <= LONGEST_SIZE else None
+    return (match[1], match[2]) if match is not None and length_unit(match[2]) else (text, "")
+
+
+def agreed(unit: str | None, *words: Any) -> str | None:
+    """The unit of a size: of its column, as the header or a person says, and of its row and cell. None where nobody says one.
+
+    >>> agreed(None, "", "Zoll"), agreed("um", "µm"), agreed(None, None)
+    ('inch', 'um', None)
+
+    Raises `Unreadable` where one is not known, or they contradict each other.
+    """
+    for word in (str(each).strip() for each in words if each is not None):
+        said = length_unit(word) if word else unit
+        if word and said is None:
+            known = ", ".join(LENGTHS)
+            raise Unreadable(
+                _("names the unit {word}, which is no length that is known ({known})").format(
+                    word=repr(word), known=known
+                )
+            )
+        if unit is not None and said != unit:
+            raise Unreadable(
+                _("is in {said}, its column or row says {unit}: nobody can tell which counts").format(
+                    said=said, unit=unit
+                )
+            )
+        unit = said
+    return unit
+
+
+_UNIT_COLUMNS: Final = frozenset(map(folded, NAMES["unit"]))
+
+
+@lru_cache(maxsize=1024)
+def _is_unit_column(name: str) -> bool:
+    return folded(name) in _UNIT_COLUMNS
+
+
+def unit_beside(row: Mapping[Any, Any]) -> Any:
+    """The unit that a row names in a column of its own, or an object in a member; None where it has none.
+
+    >>> unit_beside({"Actual": "0.4724", "Einheit": "Zoll"}), unit_beside({"Actual": "12"})
+    ('Zoll', None)
+    """
+    return next((value for name, value in row.items() if _is_unit_column(str(name))), None)
+
+
+def in_mm(value: Any, unit: str | None) -> Any:
+    """Lengths in mm: a number, or a list of them; what is neither stays as it is."""
+    scale = LENGTHS[unit or "mm"]
+    if isinstance(value, list):
+        return [in_mm(each, unit) for each in value]
+    is_length = isinstance(value, int | float) and not isinstance(value, bool)
+    return round(value * scale, 9) if is_length and scale != 1.0 and abs(value) < _LARGEST else value
 
 
 def _like_a_unit(word: str, *, least_doubt: bool) -> bool:

@@ -109,6 +109,11 @@ def pasted_grid(kind: str, form: Mapping[str, str]) -> tuple[dict[str, str], Gri
     if not body:
         raise _wrong("table", _("holds no numbers; copy the cells of the spreadsheet and paste them here"))
     typed = begun(kind, form)
+    long = table_reader.long_columns(heading) if kind == "grr" and heading else None
+    try:
+        body = table_reader.sizes_in_mm(heading, body, long.sizes if long else None)
+    except Unreadable as wrong:
+        raise _in_table(wrong, first, 1) from None
     if kind in {"type_one", "bias"}:
         single = [value for row in _numbers(body, first, 1) for value in row if value is not None]
         lines = -(-len(single) // PER_LINE)
@@ -116,7 +121,7 @@ def pasted_grid(kind: str, form: Mapping[str, str]) -> tuple[dict[str, str], Gri
         texts = [as_typed(value) for value in single] + [""] * (lines * PER_LINE - len(single))
         cells = [texts[at : at + PER_LINE] for at in range(0, len(texts), PER_LINE)]
         return typed | {"lines": str(lines), "table": ""}, grid._replace(cells=cells)
-    if kind == "grr" and heading and (long := table_reader.long_columns(heading)):
+    if long:
         return _long_grid(typed, body, first, long)
     columns = max(map(len, body))
     operators = operators_of(typed["operators"]) if kind == "grr" else []
@@ -169,10 +174,12 @@ def _numbers(body: Sequence[Sequence[str]], first: int, column: int) -> list[lis
     try:
         return table_reader.numbers(body)
     except Unreadable as wrong:
-        words = _("row {row}, column {column}: {what}")
-        raise _wrong(
-            "table", words.format(row=wrong.row + first - 1, column=wrong.column + column - 1, what=wrong)
-        ) from None
+        raise _in_table(wrong, first, column) from None
+
+
+def _in_table(wrong: Unreadable, first: int, column: int) -> Invalid:
+    words = _("row {row}, column {column}: {what}")
+    return _wrong("table", words.format(row=wrong.row + first - 1, column=wrong.column + column - 1, what=wrong))
 
 
 def rows_of(kind: str, grid: Grid) -> list[dict[str, Any]]:

@@ -1,7 +1,7 @@
 """Tables pasted from a spreadsheet or a file: tabs, semicolons or commas; decimal comma or point.
 
 Numbers are read as everywhere (`core.number_text`): a comma or a point is the decimal sign, and a cell with a blank inside or
-with separators of thousands is refused. µm and mm behind a number are not read: values are mm throughout.
+with separators of thousands is refused. Sizes in another unit than mm, as the heading, the row or the cell says it, become mm.
 """
 
 import csv
@@ -10,9 +10,12 @@ from collections.abc import Collection, Sequence
 from typing import NamedTuple
 
 from app.core.number_text import number_or_none
+from app.files.formats.cell_values import Unreadable as WrongUnit
 from app.files.formats.cell_values import folded
 from app.files.formats.column_names import NAMES
+from app.files.formats.units import LENGTHS, UnknownUnit, agreed, in_mm, unit_behind, unit_beside, unit_in
 from app.language.i18n import _
+from app.language.numbers import as_typed
 
 MOST_CHARACTERS = 400_000
 _PARTS = {*map(folded, NAMES["part"]), "parts", "teile", "delovi", "kosi", "sample"}
@@ -95,6 +98,40 @@ def numbers(cells: Sequence[Sequence[str]]) -> list[list[float | None]]:
     return table
 
 
+def sizes_in_mm(
+    heading: Sequence[str] | None, body: Sequence[Sequence[str]], sizes: Sequence[int] | None = None
+) -> list[list[str]]:
+    """The rows of a table with sizes in mm. sizes: their places, where a column may hold the unit of each row.
+
+    Raises `Unreadable` for a unit that is not known, or two that contradict each other; row 0 is the heading.
+
+    >>> sizes_in_mm(["Part", "A [inch]"], [["1", "0.5"]]), sizes_in_mm(None, [["12.5 µm"]])
+    ([['1', '12.7']], [['0.0125']])
+    """
+    units: dict[int, str | None] = {}
+    for place, name in enumerate(heading or ()):
+        if any(number(unit_behind(row[place])[0]) is not None for row in body if place < len(row)):
+            try:
+                units[place] = unit_in(name)
+            except UnknownUnit as error:
+                words = _("the heading names the unit {word}, which is no length that is known ({known})")
+                raise Unreadable(0, place + 1, words.format(word=error.word, known=", ".join(LENGTHS))) from None
+    converted = []
+    for at, row in enumerate(body, 1):
+        said = unit_beside(dict(zip(heading or (), row, strict=False))) if sizes else None
+        cells = []
+        for place, cell in enumerate(row):
+            size, behind = unit_behind(cell)
+            value = number(size) if not sizes or place in sizes else None
+            try:
+                unit = None if value is None else agreed(units.get(place), said, behind)
+            except WrongUnit as error:
+                raise Unreadable(at, place + 1, _("“{text}” {reason}").format(text=cell[:30], reason=error)) from None
+            cells.append(cell if unit is None else as_typed(in_mm(value, unit)))
+        converted.append(cells)
+    return converted
+
+
 class Long(NamedTuple):
     """The columns of a table with one row a reading: places of part, operator and sizes."""
 
@@ -117,7 +154,9 @@ def long_columns(heading: Sequence[str]) -> Long | None:
     part, operator, size = place(_PARTS), place(_OPERATORS), place(_SIZES)
     if part is None or operator is None:
         return None
-    others = tuple(at for at in range(len(names)) if at not in {part, operator})
+    others = tuple(
+        at for at, name in enumerate(heading) if at not in {part, operator} and unit_beside({name: ""}) is None
+    )
     sizes = others if size is None else (size,)
     return Long(part, operator, sizes) if sizes else None
 

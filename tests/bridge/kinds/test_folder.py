@@ -14,6 +14,7 @@ import pytest
 
 from app.bridge.configuration import ConfigurationError, Machine, configuration_from
 from app.bridge.file_content import Content, read_content
+from app.bridge.file_rows import Fault
 from app.bridge.kinds import folder
 from app.bridge.kinds.folder import Folder
 from app.bridge.links import ControlAway, Decided, Misconfigured, Position, Received, carries_decisions
@@ -193,7 +194,7 @@ def test_json_that_could_not_be_sent_on_fails(tmp_path: Path, member: str, words
         (HEAD + LINE.replace("D40", "D50"), {}, "line 2: 'D50' is not named in machine.cmm-1.characteristics"),
         (HEAD + LINE, {"zone": None}, "line 2, time: '23.11.2026 06:05:00' does not say in which time zone"),
         (HEAD + "23.11.2026 06:05:00;P1\n", {}, "line 2: names no characteristic"),
-        (HEAD + "23.11.2026 06:05:00;P1;D40\n", {}, "line 2, actual: '' is empty"),
+        (HEAD + "23.11.2026 06:05:00;P1;D40\n", {}, "line 2, actual: is empty"),
         (
             HEAD + LINE + LINE[:-9],
             {},
@@ -355,6 +356,19 @@ def test_a_file_that_cannot_be_read_fails_as_a_whole_and_says_why(tmp_path: Path
         store.close()
 
     run(work())
+
+
+def test_a_reason_of_many_lines_is_said_once_and_that_of_the_whole_file_first(tmp_path: Path) -> None:
+    rows = [*["23.11.2026 06:05:00;P1;D40;forty\n"] * 30, "23.11.2026 06:05:00;P1;D99;1\n" * 2, LINE.strip()]
+    content = read(tmp_path, HEAD + "".join(rows))
+    content.faults.append(Fault(None, "", "The file is too old."))
+    seen = folder.Seen((tmp_path / "a.csv",), ((1, 1),))
+    [first, second, third] = [line for line in folder._why(seen, content, tmp_path).splitlines() if line[:2] == "- "]
+    assert first == "- The file is too old."
+    assert second.startswith("- lines 2, 3, 4 and 27 more, actual: 'forty' is not a number")
+    assert third.startswith("- lines 32, 33: 'D99' is not named in machine.cmm-1.characteristics")
+    [refused] = content.received("cmm-1", "a.csv")
+    assert str(refused.fault).endswith("The file is too old. (and 2 more)")
 
 
 def test_a_file_that_is_being_written_is_waited_for(tmp_path: Path) -> None:

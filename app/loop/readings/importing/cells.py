@@ -16,9 +16,9 @@ from zoneinfo import ZoneInfo
 from app.files.formats import cell_values, delimited, spreadsheet
 from app.files.formats.cell_values import Unreadable
 from app.files.formats.delimited import Row, Unusable
-from app.files.formats.units import LENGTHS, length_unit
+from app.files.formats.units import agreed, in_mm, unit_behind
 from app.language.i18n import _
-from app.loop.readings.importing.layout import NO_DIGIT, ORIGIN, Layout, Wishes, look, named_in, rows_of
+from app.loop.readings.importing.layout import DRAWN, NO_DIGIT, ORIGIN, Layout, Wishes, look, named_in, rows_of
 from app.loop.readings.origin import Origin
 
 MOST_FLAWS = 200
@@ -26,6 +26,7 @@ SHOWN = 60  # characters of a wrong value
 SHOWN_LINES = 12
 SHOWN_CELL = 40
 AT_ONCE = 20_000  # items in memory before they are put down
+_OF_CHARACTERISTIC = {"characteristic", *DRAWN}
 
 
 class Flaw(NamedTuple):
@@ -162,22 +163,22 @@ def _csv(path: Path, layouts: Sequence[Layout]) -> Iterator[Item]:
                 passed = Passed(row.line, _("is the heading again"))
                 yield from (Item(place, row.line, passed) for place in range(len(layouts)))
                 continue
-            if (stranger := _stranger(row, layouts)) is not None:
+            if (stranger := _stranger(row.line, row.cells, layouts)) is not None:
                 yield Item(0, row.line, stranger)
                 continue
             for place, own in enumerate(layouts):
-                if not own.only or own.only == named_in(row, own):
+                if not own.only or own.only == named_in(row.cells, own):
                     yield from (Item(place, row.line, found) for found in _of_row(row, own, readers[place]))
     except Unusable as error:
         line = error.line or 0
         yield from (Item(place, line, Flaw(line, "", "", str(error))) for place in range(len(layouts)))
 
 
-def _stranger(row: Row, layouts: Sequence[Layout]) -> Passed | None:
+def _stranger(line: int, cells: Sequence[Any], layouts: Sequence[Layout]) -> Passed | None:
     """A row of a characteristic that is not read."""
-    if not layouts[0].only or (name := named_in(row, layouts[0])) in {each.only for each in layouts}:
+    if not layouts[0].only or (name := named_in(cells, layouts[0])) in {each.only for each in layouts}:
         return None
-    return Passed(row.line, _("is of {name}, which is not chosen").format(name=repr(name)))
+    return Passed(line, _("is of {name}, which is not chosen").format(name=repr(name)))
 
 
 def _of_row(row: Row, layout: Layout, readers: Sequence["_Reader"]) -> Iterator["dict[str, Any] | Flaw | Passed"]:
@@ -188,23 +189,37 @@ def _of_row(row: Row, layout: Layout, readers: Sequence["_Reader"]) -> Iterator[
         yield Passed(row.line, _("has no size: its mark says that it is missing"))
         return
     values: dict[str, Any] = {}
-    flawed = False
+    flawed, behind = False, ""
     for name, places, read in readers:
-        text = " ".join(row.cells[place] for place in places).strip()
+        text = size = " ".join(row.cells[place] for place in places).strip()
+        if name == "measured":
+            size, behind = unit_behind(text)
         try:
             if layout.kind == "sheet":
                 _refuse_error(text)
-            value = read(text)
+            value = read(size)
             if value is not None or not (text and name == "measured_at"):  # a default of programs is no time
                 values[name] = value
         except Unreadable as error:
             flawed = True
             yield Flaw(row.line, layout.named(name), shown(text), str(error))
-    if "unit" in values and not flawed:
-        scale = values.pop("unit") or 1.0
-        values["measured"] = values["measured"] if scale == 1.0 else round(values["measured"] * scale, 9)
     if not flawed:
-        yield _with_origin(values)
+        yield _in_mm(values, layout, row.line, behind)
+
+
+def _in_mm(values: dict[str, Any], layout: Layout, line: int, behind: str = "") -> "dict[str, Any] | Flaw":
+    """The fields of a reading with its sizes in mm, and with its origin. behind: the unit behind the size in its cell."""
+    said = values.pop("unit", None)
+    try:
+        unit = agreed(layout.said_unit, said, behind)
+    except Unreadable as error:
+        column = layout.named("unit") if said else layout.named("measured")
+        reason = str(error)
+        if said:
+            reason += _("; if this column holds no units, say so: --map unit=")
+        return Flaw(line, column, "", reason)
+    sizes = {name: in_mm(values[name], unit) for name in ("measured", "touches") if name in values}
+    return _with_origin(values | sizes)
 
 
 def _with_origin(values: dict[str, Any]) -> dict[str, Any]:
@@ -236,13 +251,12 @@ def _refuse_error(text: str) -> None:
 
 
 def _readers(layout: Layout) -> list[_Reader]:
-    scale, decimal, zone, pattern = LENGTHS[layout.unit], layout.decimal, layout.zone, layout.time_format
+    decimal, zone, pattern = layout.decimal, layout.zone, layout.time_format
 
     def length(text: str) -> float:
         # Numbers of a workbook have no decimal sign: a text with a comma among them can be read in one way only.
         comma = layout.kind == "sheet" and "," in text and "." not in text
-        value = cell_values.number(text, "," if comma else decimal)
-        return value if scale == 1.0 else round(value * scale, 9)
+        return cell_values.number(text, "," if comma else decimal)
 
     def time(text: str) -> datetime | None:
         return layout.times.moment(text, zone, pattern)
@@ -258,19 +272,11 @@ def _readers(layout: Layout) -> list[_Reader]:
         "machined_at": lambda text: time(text) if text else None,
         "correction_in_effect": whole,
         "received_at": lambda text: _or_none(text, zone),
-        "unit": _scale,
         "touches": _touches,
         "context": _context,
     }
-    columns = ((name, places) for name, places in layout.columns.items() if name != "characteristic")
+    columns = ((name, places) for name, places in layout.columns.items() if name not in _OF_CHARACTERISTIC)
     return [(name, places, kinds.get(name, lambda text: text or None)) for name, places in columns]
-
-
-def _scale(text: str) -> float | None:
-    """Millimetres in the unit that a row names."""
-    if text and length_unit(text) is None:
-        raise Unreadable(_("is no unit of length that is known ({units})").format(units=", ".join(LENGTHS)))
-    return LENGTHS[length_unit(text) or "mm"] if text else None
 
 
 def _or_none(text: str, zone: ZoneInfo | None) -> datetime | None:
@@ -297,7 +303,13 @@ def _context(text: str) -> Any:
 
 def _json(path: Path, layouts: Sequence[Layout]) -> Iterator[Item]:
     for number, value in objects(path, layouts[0].kind):
+        cells = [value.get(name) for name in layouts[0].header] if isinstance(value, dict) else []
+        if cells and (stranger := _stranger(number, cells, layouts)) is not None:
+            yield Item(0, number, stranger)
+            continue
         for place, layout in enumerate(layouts):
+            if cells and layout.only and layout.only != named_in(cells, layout):
+                continue
             yield from (Item(place, number, found) for found in _of_object(number, value, layout))
 
 
@@ -311,12 +323,15 @@ def _of_object(number: int, value: Any, layout: Layout) -> Iterator["dict[str, A
     values = {
         name: value.get(layout.header[places[0]])
         for name, places in layout.columns.items()
-        if value.get(layout.header[places[0]]) is not None
+        if name not in _OF_CHARACTERISTIC and value.get(layout.header[places[0]]) is not None
     }
+    for name in ("part", "key"):
+        if isinstance(values.get(name), int) and not isinstance(values[name], bool):
+            values[name] = str(values[name])
     flaws = list(_converted(values, layout, number))
     yield from flaws
     if not flaws:
-        yield _with_origin(values)
+        yield _in_mm(values, layout, number)
 
 
 def objects(path: Path, kind: str) -> Iterator[tuple[int, Any]]:
@@ -339,10 +354,7 @@ def objects(path: Path, kind: str) -> Iterator[tuple[int, Any]]:
 
 
 def _converted(values: dict[str, Any], layout: Layout, number: int) -> Iterator[Flaw]:
-    """Bring lengths to mm and times to their zone; what is of the wrong kind is reported with the other fields."""
-    scale = LENGTHS[layout.unit]
-    if scale != 1.0 and isinstance(values.get("measured"), int | float) and abs(values["measured"]) < 1e300:
-        values["measured"] = round(values["measured"] * scale, 9)
+    """Bring times to their zone; what is of the wrong kind is reported with the other fields."""
     if isinstance(values.get("received_at"), str):
         values["received_at"] = _or_none(values["received_at"], layout.zone)
     for name in ("measured_at", "machined_at"):

@@ -6,7 +6,7 @@ from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import accumulate, chain, islice
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 from zoneinfo import ZoneInfo
 
 from app.errors import FieldError, Invalid
@@ -15,7 +15,7 @@ from app.files.formats.cell_values import slashed
 from app.files.formats.column_names import NAMES
 from app.files.formats.delimited import Row, Unusable
 from app.files.formats.file_times import FileTimes, times_of
-from app.files.formats.units import LENGTHS, UnknownUnit, unit_in
+from app.files.formats.units import LENGTHS, UnknownUnit, unit_behind, unit_in
 from app.language.i18n import _
 from app.loop.readings.origin import COLUMNS
 
@@ -26,9 +26,8 @@ TOP = 50  # rows in which the header is looked for
 ORIGIN = COLUMNS[:2]
 """Fields that are no choice of a person: they are there in what Inband wrote."""
 NO_DIGIT = "*"
-NOMINALS = {"nominal", "nominal value", "soll", "sollwert", "sollmass", "nominalna vrednost", "номинал"}
-"""Columns that are there where each row is one characteristic; one called id then names it."""
-UNITS = {"unit", "units", "einheit", "jedinica", "enota", "единица"}
+DRAWN = ("nominal", "upper", "lower")
+"""Fields of a characteristic, not of its readings: they set it up where it is missing."""
 MOST_NAMES = 1_000
 DATES = {"date", "datum", "дата", "датум"}
 TIMES = {"time", "zeit", "uhrzeit", "vreme", "cas", "время", "време"}
@@ -51,6 +50,17 @@ class Wishes:
     missing: frozenset[str] = frozenset()  # marks in place of a size that is missing; NO_DIGIT for all without a digit
 
 
+class Drawn(NamedTuple):
+    """A characteristic as the first of its rows describes it, each field as it is written. other: a line that says otherwise."""
+
+    line: int
+    nominal: str
+    upper: str
+    lower: str
+    unit: str
+    other: int = 0
+
+
 @dataclass(frozen=True)
 class Layout:
     """The layout by which a file is read."""
@@ -61,7 +71,7 @@ class Layout:
     encoding: str = "utf-8"
     delimiter: str = ","
     decimal: str = "."
-    unit: str = "mm"
+    said_unit: str | None = None  # of the column of sizes, by a person or its header; a row or a cell may say its own
     zone: ZoneInfo | None = None
     time_format: str | None = None
     header_line: int = 1
@@ -69,14 +79,26 @@ class Layout:
     last_line: int | None = None  # below are sums and means
     missing: frozenset[str] = frozenset()
     times: FileTimes = FileTimes()  # noqa: RUF009 - a tuple
-    names: tuple[str, ...] = ()  # of characteristics, where each row says which one it is of
+    drawn: Mapping[str, Drawn] = field(
+        default_factory=dict
+    )  # where each row says of which characteristic it is, by name
     only: str = ""  # the one of them that is read
     skips_blank: bool = False  # a row without the measured value says nothing: another column of a wide sheet has one
+
+    @property
+    def unit(self) -> str:
+        """Unit of sizes whose row and cell name none."""
+        return self.said_unit or "mm"
 
     @property
     def is_table(self) -> bool:
         """Tell if its lines are rows of cells."""
         return self.kind in {"csv", "sheet"}
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of characteristics, where each row says of which one it is."""
+        return tuple(self.drawn)
 
     @property
     def complete(self) -> bool:
@@ -173,10 +195,10 @@ def wrong(where: str, message: str) -> Invalid:
     return Invalid(f"{where}: {message}", _("Nothing was imported."), errors=[FieldError(where, message)])
 
 
-def unit_of(column: str, said: str | None) -> str:
-    """The unit of a column's numbers: what a person said, else what its header names, else mm. Raises `Invalid`."""
+def unit_of(column: str, said: str | None) -> str | None:
+    """The unit of a column's numbers: what a person said, else what its header names. Raises `Invalid`."""
     try:
-        return said or unit_in(column) or "mm"
+        return said or unit_in(column)
     except UnknownUnit as error:
         raise wrong(
             "unit",
@@ -221,7 +243,7 @@ def _csv_layout(path: Path, wishes: Wishes, zone: ZoneInfo | None, kind: str = "
     # Where no column is the measured one, it may be any of them, or several.
     only = slice(place, place + 1) if "measured" in columns else slice(None)
     below = [row for row in chain(top, islice(rows, 200)) if row.line >= first_line]
-    sample = [cell for row in below for cell in row.cells[only]]
+    sample = [unit_behind(cell)[0] for row in below for cell in row.cells[only]]
     made = Layout(
         kind=kind,
         header=header,
@@ -229,7 +251,7 @@ def _csv_layout(path: Path, wishes: Wishes, zone: ZoneInfo | None, kind: str = "
         encoding=encoding,
         delimiter=delimiter,
         decimal=wishes.decimal or delimited.decimal_of(sample),
-        unit=unit_of(header[place] if "measured" in columns else "", wishes.unit),
+        said_unit=unit_of(header[place] if "measured" in columns else "", wishes.unit),
         zone=zone,
         time_format=wishes.time_format,
         header_line=head,
@@ -237,11 +259,20 @@ def _csv_layout(path: Path, wishes: Wishes, zone: ZoneInfo | None, kind: str = "
         last_line=wishes.last_line,
         missing=wishes.missing,
     )
-    return replace(made, times=_times(made, below, rows), names=_names_in(path, made))
+    named = (
+        (row.line, row.cells) for row in rows_of(path, made) if isinstance(row, Row) and tuple(row.cells) != header
+    )
+    return replace(_timed(made, _times(made, below, rows)), drawn=_drawn(made, named))
+
+
+def _timed(layout: Layout, times: FileTimes) -> Layout:
+    """The layout with these times; a column that holds none is none of times."""
+    columns = {name: places for name, places in layout.columns.items() if name != "measured_at" or not times.nothing}
+    return replace(layout, times=times, columns=columns)
 
 
 def _times(layout: Layout, begin: Sequence[Row], rest: Iterator[Row]) -> FileTimes:
-    """Common properties of the times of the file; of all lines only where dates with strokes leave the order open."""
+    """Common properties of the times of the file; of all lines only where the first ones leave something open."""
     places = layout.columns.get("measured_at", ())
     if not places:
         return FileTimes()
@@ -250,7 +281,7 @@ def _times(layout: Layout, begin: Sequence[Row], rest: Iterator[Row]) -> FileTim
         return (text_of(row, places) for row in rows)
 
     found = times_of(written(begin), layout.time_format)
-    if found.order is not None or not any(slashed(text) for text in written(begin)):
+    if found.dated and (found.order is not None or not any(slashed(text) for text in written(begin))):
         return found
     return times_of(written(chain(begin, rest)), layout.time_format)
 
@@ -260,28 +291,36 @@ def text_of(row: Row, places: Sequence[int]) -> str:
     return " ".join(row.cells[place] for place in places if place < len(row.cells)).strip()
 
 
-def _names_in(path: Path, layout: Layout) -> tuple[str, ...]:
-    """The characteristics that the rows name, in their order."""
-    if "characteristic" not in layout.columns:
-        return ()
-    names: dict[str, None] = {}
-    for row in rows_of(path, layout):
-        if isinstance(row, Row) and (name := named_in(row, layout)) and tuple(row.cells) != layout.header:
-            if len(name) > LONGEST_NAME:
-                raise wrong(
-                    f"{layout.named('characteristic')}, {_('line {line}').format(line=row.line)}", _long_name(name)
-                )
-            names[name] = None
-            if len(names) > MOST_NAMES:
-                column = layout.named("characteristic")
-                words = _("The column names more than {most} characteristics; part the file.")
-                raise wrong(column, words.format(most=MOST_NAMES))
-    return tuple(names)
+def _drawn(layout: Layout, rows: Iterable[tuple[int, Sequence[Any]]]) -> dict[str, Drawn]:
+    """The characteristics that the rows name, in their order. rows: by their lines, cells in the order of the header."""
+    found: dict[str, Drawn] = {}
+    for line, cells in rows if "characteristic" in layout.columns else ():
+        name = named_in(cells, layout)
+        if not name:
+            continue
+        if len(name) > LONGEST_NAME:
+            raise wrong(f"{layout.named('characteristic')}, {_('line {line}').format(line=line)}", _long_name(name))
+        nominal, upper, lower, unit = (
+            " ".join(_written(cells[at]) for at in layout.columns.get(each, ())) for each in (*DRAWN, "unit")
+        )
+        drawn = Drawn(line, nominal, upper, lower, unit)
+        first = found.setdefault(name, drawn)
+        if not first.other and first[1:5] != drawn[1:5]:
+            found[name] = first._replace(other=line)
+        if len(found) > MOST_NAMES:
+            column = layout.named("characteristic")
+            words = _("The column names more than {most} characteristics; part the file.")
+            raise wrong(column, words.format(most=MOST_NAMES))
+    return found
 
 
-def named_in(row: Row, layout: Layout) -> str:
+def named_in(cells: Sequence[Any], layout: Layout) -> str:
     """The characteristic that a row names."""
-    return " ".join(row.cells[place] for place in layout.columns["characteristic"]).strip()
+    return " ".join(_written(cells[place]) for place in layout.columns["characteristic"])
+
+
+def _written(cell: Any) -> str:
+    return "" if cell is None else str(cell).strip()
 
 
 def rows_of(path: Path, layout: Layout) -> Iterator[Row | Unusable]:
@@ -348,35 +387,42 @@ def _filled(row: Row) -> set[int]:
 
 def _json_layout(path: Path, wishes: Wishes, zone: ZoneInfo | None, *, is_list: bool) -> Layout:
     names: dict[str, None] = {}
-    values = _first_values(path, is_list=is_list)
+    values = [value for _at, value in islice(_objects(path, is_list=is_list), 200)]
     for value in values:
-        if isinstance(value, dict):
-            names.update(dict.fromkeys(map(str, value)))
-            _refuse_wide(names)
+        names.update(dict.fromkeys(map(str, value)))
+        _refuse_wide(names)
     header = tuple(names)
     if not header:
         raise wrong("file", _("The file holds no JSON objects."))
     columns = _columns(header, wishes.mapping)
-    columns.pop("characteristic", None)  # objects of several are sent to the API
-    columns.pop("unit", None)
     unit = unit_of(header[columns["measured"][0]] if "measured" in columns else "", wishes.unit)
     layout = Layout(
-        "list" if is_list else "lines", header, columns, unit=unit, zone=zone, time_format=wishes.time_format
+        "list" if is_list else "lines", header, columns, said_unit=unit, zone=zone, time_format=wishes.time_format
     )
+    if "characteristic" in columns:
+        rows = ((at, [value.get(name) for name in header]) for at, value in _objects(path, is_list=is_list))
+        layout = replace(layout, drawn=_drawn(layout, rows))
     if "measured_at" not in columns:
         return layout
     name = layout.named("measured_at")
-    texts = (value.get(name) for value in values if isinstance(value, dict))
-    return replace(layout, times=times_of((text for text in texts if isinstance(text, str)), wishes.time_format))
+    texts = [value.get(name) for value in values]
+    times = times_of((text for text in texts if isinstance(text, str)), wishes.time_format)
+    if not times.dated and not any(isinstance(text, int | float) for text in texts):
+        texts = [value.get(name) for _at, value in _objects(path, is_list=is_list)]
+        times = times_of((text for text in texts if isinstance(text, str)), wishes.time_format)
+    return _timed(layout, times)
 
 
-def _first_values(path: Path, *, is_list: bool, most: int = 200) -> list[Any]:
+def _objects(path: Path, *, is_list: bool) -> Iterator[tuple[int, dict[str, Any]]]:
+    """The objects of a file by their lines or places; what is none is named when it is read."""
     try:
         if is_list:
             whole = json.loads(path.read_text("utf-8-sig"))
-            return whole[:most] if isinstance(whole, list) else []
+            yield from ((at, each) for at, each in enumerate(whole, 1) if isinstance(each, dict))
+            return
         with path.open(encoding="utf-8-sig") as file:
-            return [_object(line) for line, _count in zip(file, range(most), strict=False) if line.strip()]
+            read = ((at, _object(line)) for at, line in enumerate(file, 1))
+            yield from ((at, each) for at, each in read if isinstance(each, dict))
     except UnicodeDecodeError:
         raise Unusable(_("JSON files are UTF-8 text; this is not.")) from None
     except ValueError as error:
@@ -413,7 +459,9 @@ def _columns(header: tuple[str, ...], mapping: Mapping[str, str]) -> dict[str, t
     used_places = {place for places in columns.values() for place in places}
     guesses = _guesses(header).items()
     columns |= {name: guess for name, guess in guesses if name not in mapping and not used_places & set(guess)}
-    return columns
+    if "characteristic" in columns:
+        return columns
+    return {name: places for name, places in columns.items() if name not in DRAWN}
 
 
 def _places(header: tuple[str, ...], column: str) -> tuple[int, ...] | None:
@@ -434,6 +482,11 @@ def _place(header: tuple[str, ...], column: str) -> int | None:
     return None
 
 
+def is_unsigned(column: str) -> bool:
+    """Tell of a column of lower deviations without a sign, which its name has: -TOL."""
+    return column.strip().lower().replace(" ", "") in {"-tol", "tol-", "-tolerance"}
+
+
 def _guesses(header: tuple[str, ...]) -> dict[str, tuple[int, ...]]:
     names = [cell_values.folded(name) for name in header]
     guesses: dict[str, tuple[int, ...]] = {}
@@ -446,10 +499,11 @@ def _guesses(header: tuple[str, ...]) -> dict[str, tuple[int, ...]]:
     time = next((place for place, each in enumerate(names) if each in TIMES), None)
     if date is not None and time is not None:
         guesses["measured_at"] = (date, time)
-    if "characteristic" not in guesses and "measured" in guesses and "id" in names and NOMINALS & set(names):
+    unsigned = [at for at, name in enumerate(header) if is_unsigned(name)]
+    if "lower" not in guesses and unsigned:
+        guesses["lower"] = (unsigned[0],)
+    if "characteristic" not in guesses and "measured" in guesses and "id" in names and "nominal" in guesses:
         guesses["characteristic"] = (names.index("id"),)
-    if "characteristic" in guesses and (unit := next((at for at, name in enumerate(names) if name in UNITS), None)):
-        guesses["unit"] = (unit,)
     if set(COLUMNS) <= set(header):
         guesses |= {name: (header.index(name),) for name in ORIGIN}
     return guesses

@@ -17,11 +17,14 @@ from app.files.formats.delimited import ENCODINGS
 from app.language.i18n import _
 from app.language.times import plant_zone
 from app.loop.characteristics import queries as characteristics
-from app.loop.readings.importing import uploads, wide
+from app.loop.machines import queries as machines
+from app.loop.readings.importing import drawn, uploads, wide
 from app.loop.readings.importing.actions import import_readings
 from app.loop.readings.importing.aqdef import form as aqdef_form
+from app.loop.readings.importing.aqdef.actions import machine_for
+from app.loop.readings.importing.aqdef.matching import NEW, Content
 from app.loop.readings.importing.history import Flawed
-from app.loop.readings.importing.layout import NO_DIGIT, Layout, Wishes, refuse_incomplete
+from app.loop.readings.importing.layout import DRAWN, NO_DIGIT, Layout, Wishes, refuse_incomplete
 from app.loop.readings.importing.lines import look_apart, read_apart
 from app.loop.readings.importing.preview import TRIED_WHOLE, Preview, PreviewLine, first_lines, preview
 from app.loop.readings.importing.uploads import Upload
@@ -35,7 +38,7 @@ router = APIRouter(include_in_schema=False)
 Token = Annotated[str, Path(max_length=64)]
 HOW = (
     "timezone", "unit", "decimal", "delimiter", "encoding", "header_line", "first_line", "last_line", "missing", "time_format",
-    "sheet",
+    "sheet", "machine",
 )  # fmt: skip
 SIGNS = {"tab": "\t", "comma": ",", "semicolon": ";", "bar": "|", "blanks": delimited.BLANKS}
 
@@ -95,23 +98,25 @@ def _start(
 @takes(64 * MEGABYTE, by="engineer")
 async def send(request: Request, session: SessionDep, caller: Engineer, settings: SettingsDep) -> Response:
     """Keep the file and go on to the preview."""
-    form = await request.form()
-    characteristic = str(form.get("characteristic") or "")
-    files = [
-        (each.filename, each.file) for each in form.getlist("file") if isinstance(each, UploadFile) and each.filename
-    ]
-    if not files:
-        return await run_in_threadpool(
-            _start, request, session, characteristic, error=_("Choose the file to import."), status=422
-        )
-    if characteristic:
-        await run_in_threadpool(characteristics.characteristic_named, session, characteristic)
-    await run_in_threadpool(session.commit)  # nothing is kept open while a workbook is read
-    try:
-        kept = await run_in_threadpool(uploads.keep_pair, settings, caller.name, files)
-    except Invalid as error:
-        return await run_in_threadpool(_refused, request, characteristic, error.detail)
-    return RedirectResponse(address(f"/import/{kept.token}", characteristic=characteristic or None), 303)
+    async with request.form() as form:
+        characteristic = str(form.get("characteristic") or "")
+        files = [
+            (each.filename, each.file)
+            for each in form.getlist("file")
+            if isinstance(each, UploadFile) and each.filename
+        ]
+        if not files:
+            return await run_in_threadpool(
+                _start, request, session, characteristic, error=_("Choose the file to import."), status=422
+            )
+        if characteristic:
+            await run_in_threadpool(characteristics.characteristic_named, session, characteristic)
+        await run_in_threadpool(session.commit)  # nothing is kept open while a workbook is read
+        try:
+            kept = await run_in_threadpool(uploads.keep_pair, settings, caller.name, files)
+        except Invalid as error:
+            return await run_in_threadpool(_refused, request, characteristic, error.detail)
+        return RedirectResponse(address(f"/import/{kept.token}", characteristic=characteristic or None), 303)
 
 
 def _refused(request: Request, characteristic: str, error: str) -> Response:
@@ -187,6 +192,8 @@ def _wide_preview(request: Request, upload: Upload, said: Mapping[str, str], *, 
     shown: list[PreviewLine] = []
     chosen: dict[int, str] = {}
     results: list[ColumnResult] = []
+    could_be_new: list[Content] = []
+    cannot_be_new: list[Content] = []
     try:
         looked = look_apart(upload.path, _wishes(said), upload.name)
         layout = looked.layout
@@ -196,9 +203,16 @@ def _wide_preview(request: Request, upload: Upload, said: Mapping[str, str], *, 
             chosen = {column.place: column.characteristic for column in wide.columns_of(said, layout)}
         else:
             chosen = wide.columns_by_name(layout, known)
+        could_be_new, cannot_be_new = drawn.missing(layout, chosen)
+        if said.get("all") == "new":
+            chosen |= {each.index: NEW for each in could_be_new}
+            could_be_new = []
+        if layout.names:
+            said = {**said, "machine": _machine(request, said) or ""}
         shown = first_lines(looked)
         if chosen and upload.path.stat().st_size <= TRIED_WHOLE:
-            results = wide.preview(_database(request), chosen, upload.path, layout, unit=_wishes(said).unit)
+            how: dict[str, Any] = {"unit": _wishes(said).unit, "machine": said.get("machine") or None}
+            results = wide.preview(_database(request), chosen, upload.path, layout, **how)
     except InbandError as error:
         trouble = error
     ready = bool(chosen) and trouble is None and all(result.trouble is None for result in results)
@@ -214,8 +228,22 @@ def _wide_preview(request: Request, upload: Upload, said: Mapping[str, str], *, 
         chosen=chosen,
         results=results,
         known=known,
+        could_be_new=could_be_new,
+        cannot_be_new=cannot_be_new,
+        machines=_machines(request) if layout and layout.names else [],
         ready=ready,
     )
+
+
+def _machine(request: Request, said: Mapping[str, str]) -> str | None:
+    """The machine on which missing ones are set up: the one named, or the only one."""
+    with _database(request).sessions() as session:
+        return machine_for(session, (), said.get("machine") or None)
+
+
+def _machines(request: Request) -> list[tuple[str, str]]:
+    with _database(request).sessions() as session:
+        return [(each.key, each.name) for each in machines.machines(session)]
 
 
 def _page(
@@ -272,13 +300,19 @@ def _fields(layout: Layout, *, wide: bool = False) -> list[dict[str, Any]]:
         "measured_at": _("Time of measuring"),
         "machined_at": _("Time of cutting"),
         "part": _("Part"),
+        "unit": _("Unit"),
         "characteristic": _("Characteristic"),
+        "nominal": _("Nominal size"),
+        "upper": _("Upper limit"),
+        "lower": _("Lower limit"),
         "key": _("Key"),
     }
     columns = [(str(at), name or _("Column {n}").format(n=at)) for at, name in enumerate(layout.header, start=1)]
     fields: list[dict[str, Any]] = []
     for name, label in labels.items():
         if wide and name in {"measured", "key"} and not layout.names:
+            continue
+        if name in DRAWN and not (wide and layout.names):
             continue
         places = layout.columns.get(name, ())
         value = "+".join(str(place + 1) for place in places)
@@ -353,6 +387,7 @@ def _import_wide(
         upload.path,
         layout,
         unit=_wishes(form).unit,
+        machine=form.get("machine") or None,
         actor=caller.name,
         source=upload.name,
     )

@@ -1,10 +1,10 @@
 """Wide sheets: one column a characteristic, one row a part. All columns are imported or none."""
 
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from sqlalchemy.orm import Session
 
@@ -15,6 +15,9 @@ from app.language.i18n import _
 from app.loop.characteristics import queries as characteristics
 from app.loop.characteristics.queries import CurrentCharacteristic
 from app.loop.readings import queries
+from app.loop.readings.importing import drawn
+from app.loop.readings.importing.aqdef.actions import machine_for, set_up
+from app.loop.readings.importing.aqdef.matching import NEW, Content
 from app.loop.readings.importing.cells import MOST_FLAWS, Flaw
 from app.loop.readings.importing.history import Flawed, Progress, Summary, store_history
 from app.loop.readings.importing.layout import ORIGIN, Layout, unit_of
@@ -30,11 +33,12 @@ class Column(NamedTuple):
 
 
 class ColumnResult(NamedTuple):
-    """The result of one column: what was stored, or would be, or why it cannot be."""
+    """The result of one column: what was stored, or would be, or why it cannot be. created: its characteristic was set up."""
 
     column: Column
     summary: Summary | None
     trouble: InbandError | None = None
+    created: bool = False
 
     @property
     def flaws(self) -> list[Flaw]:
@@ -65,7 +69,7 @@ def layout_of(layout: Layout, column: Column, unit: str | None) -> Layout:
         name: places for name, places in layout.columns.items() if name not in {"measured", "touches", "key", *ORIGIN}
     }
     own_unit = unit_of(layout.header[column.place], unit)
-    return replace(layout, columns=fields | {"measured": (column.place,)}, unit=own_unit, skips_blank=True)
+    return replace(layout, columns=fields | {"measured": (column.place,)}, said_unit=own_unit, skips_blank=True)
 
 
 def import_wide(
@@ -78,20 +82,24 @@ def import_wide(
     actor: str,
     source: str,
     dry_run: bool = False,
+    machine: str | None = None,
     progress: Progress = lambda: None,
     read: Read | None = None,
 ) -> list[ColumnResult]:
     """Import every column as history of its characteristic, in one transaction.
 
     dry_run: say for each column what would happen, also what stands against it. Raises `NotFound`, `Flawed` and `Invalid`
-    otherwise; then nothing is stored. read: the lines of each column, where they were read apart.
+    otherwise; then nothing is stored. read: the lines of each column, where they were read apart. machine: on which those
+    are set up whose characteristic is `NEW`.
     """
     _refuse_twice(columns)
     with database.sessions() as session:
-        entries = [(place, column, _entry(session, column)) for place, column in enumerate(columns)]
+        there = _with_new(session, columns, layout, machine, actor)
+        entries = [(place, column, _entry(session, column)) for place, column in enumerate(there)]
         results = []
         # In the order of the machines, as everybody takes their locks.
         for place, column, entry in sorted(entries, key=lambda each: each[2].machine_id):
+            created = columns[place].characteristic == NEW
             with session.begin_nested() as part:
                 try:
                     own = layout_of(layout, column, unit)
@@ -99,7 +107,7 @@ def import_wide(
                         lines(path, own, entry.characteristic) if read is None else read(place, entry.characteristic)
                     )
                     summary = store_history(session, entry, found, actor=actor, source=source, progress=progress)
-                    results.append(ColumnResult(column, summary))
+                    results.append(ColumnResult(column, summary, created=created))
                 except InbandError as trouble:
                     part.rollback()
                     results.append(ColumnResult(column, None, trouble))
@@ -121,13 +129,13 @@ def import_apart(
     actor: str = "",
     source: str = "",
     dry_run: bool = False,
+    machine: str | None = None,
 ) -> list[ColumnResult]:
     """The same with a file of somebody else, which is read once, in a process of its own."""
     _refuse_twice(columns)
     with read_apart(path, [_layout_of(layout, column, unit) for column in columns]) as read:
-        return import_wide(
-            database, columns, path, layout, unit=unit, actor=actor, source=source, dry_run=dry_run, read=read
-        )
+        how: dict[str, Any] = {"actor": actor, "source": source, "dry_run": dry_run, "machine": machine}
+        return import_wide(database, columns, path, layout, unit=unit, read=read, **how)
 
 
 def _layout_of(layout: Layout, column: Column, unit: str | None) -> Layout:
@@ -139,16 +147,37 @@ def _layout_of(layout: Layout, column: Column, unit: str | None) -> Layout:
 
 
 def preview(
-    database: Database, chosen: Mapping[int, str], path: Path, layout: Layout, *, unit: str | None
+    database: Database, chosen: Mapping[int, str], path: Path, layout: Layout, *, unit: str | None, machine: str | None
 ) -> list[ColumnResult]:
     """The result that each column would have. Stores nothing."""
     columns = [Column(place, key) for place, key in chosen.items()]
-    return import_apart(database, columns, path, layout, unit=unit, dry_run=True)
+    return import_apart(database, columns, path, layout, unit=unit, dry_run=True, machine=machine)
+
+
+def _with_new(
+    session: Session, columns: Sequence[Column], layout: Layout, machine: str | None, actor: str
+) -> list[Column]:
+    """The columns; those for `NEW` with the characteristic that is set up for them, as the rows describe it."""
+    if all(column.characteristic != NEW for column in columns):
+        return list(columns)
+    described = {each.index: each for each in drawn.contents(layout)}
+    taken = {each.characteristic.key: 1 for each in characteristics.characteristics(session, limit=100_000)}
+    made = []
+    for column in columns:
+        if column.characteristic == NEW:
+            content = described.get(column.place)
+            reason = content.not_new if content else _("only a table whose rows name their characteristic describes it")
+            if content is None or reason:
+                raise Invalid.at(layout.subjects[column.place], _("cannot be set up: {reason}").format(reason=reason))
+            made.append(column._replace(characteristic=set_up(session, content, machine, actor, taken)))
+        else:
+            made.append(column)
+    return made
 
 
 def _refuse_twice(columns: Sequence[Column]) -> None:
     for key, count in Counter(column.characteristic for column in columns).items():
-        if count > 1:
+        if count > 1 and key != NEW:
             raise Invalid.at("columns", _("{key} is named for two columns; name it for one").format(key=key))
     if not columns:
         raise Invalid.at("columns", _("No column is said to be a characteristic; say which is which"))
@@ -176,14 +205,20 @@ def _refuse_flawed(results: Sequence[ColumnResult]) -> None:
 
 def columns_said(text: str, layout: Layout) -> list[Column]:
     """Columns from `D35=shaft-d35,3=shaft-d40`: a column by name or number, and the key of its characteristic."""
+    pairs = (pair.rpartition("=") for pair in text.split(",") if pair.strip())
+    return columns_named(((name.strip(), key.strip()) for name, _sign, key in pairs), layout)
+
+
+def columns_named(pairs: Iterable[tuple[str, str]], layout: Layout) -> list[Column]:
+    """Columns out of pairs of a name or number and the key of its characteristic. Raises `Invalid`."""
     found = []
-    for pair in filter(None, (part.strip() for part in text.split(","))):
-        name, _sign, key = (part.strip() for part in pair.rpartition("="))
+    for name, key in pairs:
         place = layout.subjects.index(name) if name in layout.subjects else int(name) - 1 if name.isdecimal() else -1
         if not key or not 0 <= place < len(layout.subjects):
             there = ", ".join(layout.subjects)
             raise Invalid.at(
-                "columns", _("{pair} names no column; the file has: {header}").format(pair=repr(pair), header=there)
+                "columns",
+                _("{pair} names no column; the file has: {header}").format(pair=repr(f"{name}={key}"), header=there),
             )
         found.append(Column(place, key))
     return found
@@ -194,6 +229,15 @@ def columns_known(database: Database, layout: Layout) -> list[Column]:
     with database.sessions() as session:
         known = characteristics.characteristics(session, limit=100_000)
         return [Column(place, key) for place, key in columns_by_name(layout, known).items()]
+
+
+def with_missing(
+    database: Database, columns: Sequence[Column], layout: Layout, machine: str | None
+) -> tuple[list[Column], list[Content], str | None]:
+    """The columns, with `NEW` for all others that the rows describe; those that they do not; and the machine for new ones."""
+    new, left_out = drawn.missing(layout, {column.place for column in columns})
+    with database.sessions() as session:
+        return [*columns, *(Column(each.index, NEW) for each in new)], left_out, machine_for(session, new, machine)
 
 
 def columns_of(form: Mapping[str, str], layout: Layout) -> list[Column]:

@@ -1,27 +1,41 @@
-"""Files of others: import and bridge say the same of each.
+"""Files of others at every door: the command, the page, REST and the bridge's preview say the same of each.
 
 The shapes are those of real files. What each means is written down here as sizes and moments; a file that is refused names the
-lines.
+lines. All doors are called in this process, on one plant.
 """
 
+import html
+import json
 import re
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
+import click
 import pytest
+import typer
 
 from app.bridge.configuration import configuration_from
 from app.bridge.file_content import read_content
-from app.errors import Invalid
-from app.files.formats.delimited import BLANKS
-from app.loop.readings.importing.cells import Flaw
+from app.cli import data
+from app.errors import InbandError
+from app.files.formats.aqdef_values import OF_CHARACTERISTIC as C
+from app.files.formats.aqdef_values import OF_FIELD as F
+from app.loop.readings import exporting, queries
+from app.loop.readings.importing import drawn
+from app.loop.readings.importing import lines as importing
+from app.loop.readings.importing.aqdef import actions as aqdef_actions
+from app.loop.readings.importing.aqdef import content as aqdef_content
 from app.loop.readings.importing.layout import Wishes, look
-from app.loop.readings.importing.lines import Line, lines
-from app.loop.readings.importing.wide import Column, layout_of
+from tests.conftest import NewDatabase, drop_database
+from tests.in_process import InProcess, in_process
+from tests.shop import Person, Shop
 
 ZONE = "Europe/Belgrade"
+D40: dict[str, Any] = {"target": 40.0, "tolerance_width": 0.1, "averaging_limit": 0.033333}
+LENGTHS = {"40": D40, "16": D40 | {"target": 16.0}, "2.167": D40 | {"target": 2.167}, "0": D40 | {"target": 0.0}}
 MORNING = "2025-11-18T05:0{}:00"
 Readings = list[tuple[float, str | None]]
 
@@ -33,11 +47,14 @@ class Case:
     text: str
     good: Readings = field(default_factory=list)
     bad: tuple[int, ...] = ()
+    size: str = "40"
     column: str = ""  # of the measured value, where its name does not say so
     cli: dict[str, Any] = field(default_factory=dict)
+    page: dict[str, str] = field(default_factory=dict)
     bridge: dict[str, Any] = field(default_factory=dict)
     encoding: str = "utf-8"
     words: str = ""  # in the refusal
+    whole: bool = False  # refused as a whole, without a line
 
 
 def morning(*sizes: float) -> Readings:
@@ -76,9 +93,26 @@ TABLES = {
         MARKED,
         [(40.001, MORNING.format(5)), (40.002, "2025-11-18T05:10:00")],
         cli={"missing": "---,n.i.O.,NaN,#N/A"},
+        page={"missing": "true"},
         bridge={"missing": ["---", "n.i.O.", "NaN", "#N/A"]},
     ),
-    "unit in the cells": Case(THREE.replace("\n1", " mm\n1").replace("D40 mm", "D40"), bad=(2, 3)),
+    "unit in the cells": Case(
+        "Time;D40\n18.11.2025 06:05;40,001 mm\n18.11.2025 06:06;1,57484 in\n18.11.2025 06:07;40,003\n",
+        morning(40.001, 40.000936, 40.003),
+    ),
+    "unit beside the size": Case(
+        "Time;D40;Unit\n18.11.2025 06:05;1,57484;inch\n18.11.2025 06:06;40,002;mm\n", morning(40.000936, 40.002)
+    ),
+    "no length beside the size": Case("Time;D40;Unit\n18.11.2025 06:05;40,001;Nm\n", bad=(2,), words="no length"),
+    "a torque in the header": Case(UNIT.format("Nm"), size="0", column="Run-out [Nm]", words="Nm", whole=True),
+    "an hour too many": Case(
+        "Time;D40\n18.11.2025 24:00:00;40,001\n19.11.2025 00:00:10;40,002\n",
+        [(40.001, "2025-11-18T23:00:00"), (40.002, "2025-11-18T23:00:10")],
+    ),
+    "times of programs that are none": Case(
+        "Time;D40\n01.01.1970 00:00:00;40,001\n01.01.1970 00:00:00;40,002\n", [(40.001, None), (40.002, None)]
+    ),
+    "milliseconds": Case("Time,D40\n1763442300123,40.001\n", bad=(2,), words="milliseconds since 1970-01-01"),
     "heading again": Case(
         "Time;D40\n18.11.2025 06:05;40,001\nTime;D40\n18.11.2025 06:06;40,002\n", morning(40.001, 40.002)
     ),
@@ -86,8 +120,10 @@ TABLES = {
     "blanks": Case(
         PRINTED,
         [(2.176, None), (2.171, None), (2.169, None)],
+        size="2.167",
         column="Meas D",
         cli={"delimiter": "blanks"},
+        page={"delimiter": "blanks"},
         bridge={"delimiter": "blanks"},
     ),
     "comma for both": Case(
@@ -100,6 +136,7 @@ TABLES = {
     "minus sign": Case(
         "Time;Deviation\n18.11.2025 06:05;\N{MINUS SIGN}0,003\n18.11.2025 06:06;+0,002\n",
         morning(-0.003, 0.002),
+        size="0",
         column="Deviation",
     ),
     "inches": Case(
@@ -107,8 +144,8 @@ TABLES = {
         morning(39.99992, 40.000936),
         column="D40 (in)",
     ),
-    "mil": Case(UNIT.format("mil"), morning(0.00254, 0.003048, 0.002032), column="Run-out [mil]"),
-    "µin": Case(UNIT.format("µin"), morning(2.54e-6, 3.048e-6, 2.032e-6), column="Run-out [µin]"),
+    "mil": Case(UNIT.format("mil"), morning(0.00254, 0.003048, 0.002032), size="0", column="Run-out [mil]"),
+    "µin": Case(UNIT.format("µin"), morning(2.54e-6, 3.048e-6, 2.032e-6), size="0", column="Run-out [µin]"),
     "like rows": Case(
         "Time,D40\n2025-11-18 06:05,40.001\n2025-11-18 06:05,40.001\n2025-11-18 06:05,40.003\n",
         [(size, MORNING.format(5)) for size in (40.001, 40.001, 40.003)],
@@ -120,12 +157,14 @@ TABLES = {
         US,
         [(40.001, "2025-11-18T05:05:10"), (40.002, "2025-11-18T17:06:10")],
         cli={"time_format": "%m/%d/%Y %I:%M:%S %p"},
+        page={"time_format": "%m/%d/%Y %I:%M:%S %p"},
         bridge={"times": "%m/%d/%Y %I:%M:%S %p"},
     ),
     "two digits of a year": Case(
         GERMAN,
         [(40.001, "2025-11-18T05:05:11"), (39.998, "2025-11-18T05:06:12")],
         cli={"time_format": "%d.%m.%y %H:%M:%S"},
+        page={"time_format": "%d.%m.%y %H:%M:%S"},
         bridge={"times": "%d.%m.%y %H:%M:%S"},
         encoding="cp1252",
     ),
@@ -138,6 +177,7 @@ TABLES = {
         "Time,D40\n1763442300,40.001\n",
         morning(40.001),
         cli={"time_format": "seconds since 1970-01-01"},
+        page={"time_format": "seconds since 1970-01-01"},
         bridge={"times": "seconds since 1970-01-01"},
     ),
     "a zone by its letters": Case("Time,D40\n2025-11-18T06:05:00 CET,40.001\n", bad=(2,)),
@@ -148,6 +188,69 @@ TABLES = {
 }
 """By their names; `Time` or what stands for it is the column of times."""
 TIMES = ("Date+Time", "Datum+Uhrzeit", "Time", "Zeit")
+
+
+class Plant:
+    """The plant of these tests, and what came of a file at each door."""
+
+    def __init__(self, house: InProcess) -> None:
+        self.house, self.shop, self.engineer = house, Shop(house), Person(house, "engineer")
+
+    def stored(self, key: str) -> Readings:
+        with self.house.database.begin() as session:
+            entry = queries.entry_of(session, key)
+            assert entry is not None
+            return [
+                (row["measured"], row["measured_at"].astimezone(UTC).replace(tzinfo=None).isoformat())
+                for row in exporting.rows(session, entry)
+            ]
+
+    def command(self, path: Path, **options: Any) -> str:
+        """What the command says; the error that it ends with."""
+        try:
+            data.import_file(path, timezone=ZONE, database_url=self.house.database.dsn, **options)
+        except (typer.Exit, click.ClickException, InbandError) as error:
+            return f"refused {error}"
+        return ""
+
+    def table(self, path: Path, text: str, **given: Any) -> dict[str, Any]:
+        """The answer of REST, and its status."""
+        sent = {"name": path.name, "content": text, **given}
+        answer = self.shop.admin.post("/api/v1/readings/table", json=sent)
+        assert answer.status_code in {200, 422}, answer.text
+        content: dict[str, Any] = answer.json()
+        return content | {"status": answer.status_code}
+
+    def page(self, path: Path, characteristic: str = "", **said: str) -> str:
+        """The page of the refusal, after the preview said the same; nothing where it was imported."""
+        browser, csrf = self.engineer.browser, self.engineer._csrf()
+        sent = browser.post(
+            "/import",
+            data={"csrf": csrf, "characteristic": characteristic},
+            files={"file": (path.name, path.read_bytes())},
+        )
+        assert sent.status_code == 200, sent.text
+        token = re.search(r"/import/([\w-]{22})", str(sent.url))
+        assert token is not None
+        said = {"characteristic": characteristic, "timezone": ZONE} | said
+        preview = browser.get(f"/import/{token[1]}", params=said)
+        assert preview.status_code == 200
+        if not characteristic:
+            said |= dict(re.findall(r'<input type="hidden" name="(to_\d+)" value="([^"]*)"', preview.text))
+        answer = browser.post(f"/import/{token[1]}", data=said | {"csrf": csrf}, follow_redirects=False)
+        refused = answer.status_code != 303
+        assert refused == ("disabled" in preview.text[: preview.text.index("Import all")][-200:]), "preview and import"
+        return f"refused {answer.text}" if refused else ""
+
+
+@pytest.fixture(scope="module")
+def plant(new_database: NewDatabase) -> Iterator[Plant]:
+    url = new_database()
+    with pytest.MonkeyPatch.context() as patch, in_process(url, timezone=ZONE) as house:
+        for module in (importing, aqdef_actions, aqdef_content):  # tests/files/test_apart.py has the other process
+            patch.setattr(module, "apart", lambda work, *given: work(*given))
+        yield Plant(house)
+    drop_database(url)
 
 
 def bridged(path: Path, names: dict[str, str], **settings: Any) -> tuple[Readings, list[int | None], str]:
@@ -169,47 +272,54 @@ def as_expected(found: Readings, case: Case) -> bool:
     return sizes and all(at == wanted for (_size, at), (_good, wanted) in zip(found, case.good, strict=True) if wanted)
 
 
-def imported(path: Path, **wishes: Any) -> tuple[Readings, list[int], str]:
-    """The same of the import."""
-    found = list(lines(path, look(path, Wishes(timezone=ZONE, **wishes)), "x"))
-    flaws = [each for each in found if isinstance(each, Flaw)]
-    readings = [
-        (
-            each.reading.measured or 0.0,
-            in_utc(each.reading.measured_at.isoformat() if each.reading.measured_at else None),
-        )
-        for each in found
-        if isinstance(each, Line)
-    ]
-    return readings, [flaw.line for flaw in flaws], " ".join(map(str, flaws))
+def names_of(case: Case) -> tuple[list[str], str]:
+    """The names of the columns, and the one that is measured."""
+    rows = [line for line in case.text.replace("\ufeff", "").splitlines() if line and "sep=" not in line]
+    head = next(line for line in rows if not line.startswith(("Plate", "Date:")))
+    cells = [cell.strip().strip('"') for cell in re.split(r"[;,\t]| {2,}", head.strip())]
+    return cells, case.column or next(each for each in cells if each in {"D40", "Wert", "Value", "Measured", "Istmaß"})
 
 
 @pytest.mark.parametrize("name", TABLES)
-def test_a_table_means_the_same_to_import_and_bridge(tmp_path: Path, name: str) -> None:
-    case, path = TABLES[name], tmp_path / "a.csv"
+def test_a_table_means_the_same_at_every_door(plant: Plant, tmp_path: Path, name: str) -> None:
+    case = TABLES[name]
+    path = tmp_path / f"{name.replace(' ', '-')}.csv"
     path.write_bytes(case.text.encode(case.encoding))
-    rows = [line for line in case.text.splitlines() if line and "sep=" not in line]
-    head = next(line for line in rows if not line.startswith(("Plate", "Date:")))
-    cells = [cell.strip().strip('"\ufeff') for cell in re.split(r"[;,\t]| {2,}", head.strip())]
-    column = case.column or next(each for each in cells if each in {"D40", "Wert", "Value", "Measured", "Istmaß"})
-    wishes = dict(case.cli)
-    if "missing" in wishes:
-        wishes["missing"] = frozenset(wishes["missing"].split(","))
-    if "delimiter" in wishes:
-        wishes["delimiter"] = BLANKS
-    readings, faults, words = imported(path, mapping={"measured": column}, **wishes)
-    assert sorted(set(faults)) == list(case.bad), words
-    assert case.bad or as_expected(readings, case)
-    assert case.words in words
+    cells, column = names_of(case)
+    refused = bool(case.bad) or case.whole
+
+    by_command = plant.shop.another("cli", **LENGTHS[case.size])
+    said = plant.command(path, characteristic=by_command, mapping=f"measured={column}", **case.cli)
+    assert as_expected(plant.stored(by_command), case), said
+    assert bool(said) == refused, said
+
+    by_rest = plant.shop.another("rest", **LENGTHS[case.size])
+    how = case.cli | ({"missing": case.cli["missing"].split(",")} if "missing" in case.cli else {})
+    answer = plant.table(path, case.text, characteristic=by_rest, map={"measured": column}, timezone=ZONE, **how)
+    assert as_expected(plant.stored(by_rest), case), answer
+    assert (answer["status"] == 422) == refused
+    found = {int(line) for line in re.findall(r"line (\d+)", str([each["field"] for each in answer.get("errors", [])]))}
+    assert sorted(found) == list(case.bad)
+    assert case.words in str(answer)
+
+    by_page = plant.shop.another("page", **LENGTHS[case.size])
+    shown = html.unescape(plant.page(path, by_page, column_measured=column, **case.page))
+    assert as_expected(plant.stored(by_page), case), shown
+    assert bool(shown) == refused
+    lines = [int(line) for line in re.findall(r'<tr><td class="num">(\d+)</td>', shown.partition('id="flaws"')[2])]
+    assert sorted(set(lines)) == list(case.bad)
+    assert case.words in shown
+
     time = next((each for each in TIMES if all(part in cells for part in each.split("+"))), None)
     if time is not None and "+" in time:
         return  # the bridge's columns are single ones
     columns = {"measured": column} | ({"measured_at": time} if time else {})
     decimal = "." if re.search(r"[;,\t ]-?\d+\.\d{3,}\b", case.text) else ","
-    sent, at, said = bridged(path, {"*": "x"}, columns=columns, decimal=decimal, **case.bridge)
-    assert sorted(set(at)) == list(case.bad), said  # type: ignore[type-var]
-    assert case.bad or as_expected(sent, case)
-    assert case.words in said
+    readings, faults, words = bridged(path, {"*": "x"}, columns=columns, decimal=decimal, **case.bridge)
+    assert refused or as_expected(readings, case)
+    assert case.whole or sorted(set(faults)) == list(case.bad), words  # type: ignore[type-var]
+    assert bool(faults) == refused
+    assert case.words in words
 
 
 LONG = (
@@ -223,29 +333,205 @@ LONG = (
 PARTS = {"Seal_1_X": [0.001] * 3, "Seal_1_Y": [0.0] * 3, "Seal_1_D": [16.003, 16.004, 16.005]}
 
 
-def test_a_table_with_one_row_a_characteristic_is_sorted_by_its_names(tmp_path: Path) -> None:
+@pytest.mark.parametrize("door", ["command", "page", "rest"])
+def test_a_table_with_one_row_a_characteristic_is_sorted_by_its_names(plant: Plant, tmp_path: Path, door: str) -> None:
+    path, text = tmp_path / "chr.txt", LONG
+    keys = {name: plant.shop.another(door, **LENGTHS["16" if name[-1] == "D" else "0"]) for name in PARTS}
+    for name, key in keys.items():
+        text = text.replace(name, f"Seat {key}")
+    path.write_text(text)
+    if door == "rest":
+        assert plant.table(path, text)["stored"] == 9
+    else:
+        assert (plant.command(path) if door == "command" else plant.page(path)) == ""
+    assert {name: [size for size, _at in plant.stored(key)] for name, key in keys.items()} == PARTS
+    with plant.house.database.begin() as session:
+        entry = queries.entry_of(session, keys["Seal_1_D"])
+        assert entry is not None
+        assert [row["part"] for row in exporting.rows(session, entry)] == ["815", "816", "817"]
+
+
+@pytest.mark.parametrize("door", ["command", "page", "rest"])
+def test_of_such_a_table_what_is_missing_is_set_up_with_its_limits(plant: Plant, tmp_path: Path, door: str) -> None:
+    stem, path = plant.shop.another("long").replace("-", ""), tmp_path / "chr.txt"
+    form = f"815\t{stem}_F\t0.002\t\t0.01\n"  # a form error has an upper limit only
+    path.write_text(LONG.replace("Seal_1", stem) + form + f"815\t{stem}_N\t12.003\t12\n")
+    if door == "command":
+        assert plant.command(path, create_missing=True, machine=plant.shop.machine) == ""
+    elif door == "page":
+        assert plant.page(path, all="new", machine=plant.shop.machine) == ""
+    else:
+        answer = plant.table(path, path.read_text(), create_missing=True, machine=plant.shop.machine)
+        made = {
+            each["name"]: (each["characteristic"], each["created"], each["stored"])
+            for each in answer["characteristics"]
+        }
+        assert made[f"{stem}_D"] == (f"{stem}-d", True, 3)
+        assert made[f"{stem}_N"] == (None, False, 0)
+    for name, sizes in PARTS.items():
+        key = name.replace("Seal_1", stem).lower().replace("_", "-")
+        assert [size for size, _at in plant.stored(key)] == sizes
+        parameters = plant.shop.call("GET", f"/characteristics/{key}")["parameters"]
+        limits = [parameters[each] for each in ("nominal", "lower_deviation", "upper_deviation", "mode")]
+        assert limits == [16.0 if name[-1] == "D" else 0.0, -0.005, 0.005, "measure_only"]
+    parameters = plant.shop.call("GET", f"/characteristics/{stem}-f")["parameters"]
+    assert (parameters["upper_deviation"], parameters["natural_limit"]) == (0.01, "lower")
+    plant.shop.call("GET", f"/characteristics/{stem}-n", 404)
+    assert plant.command(path, create_missing=True) == "", "what is there now is found by its name"
+    assert [size for size, _at in plant.stored(f"{stem}-d")] == PARTS["Seal_1_D"]
+
+
+@pytest.mark.parametrize(
+    ("head", "row", "found"),
+    [
+        ("Feature;Meas;Nominal;+TOL;-TOL", "A;16.001;16;0.010;0.020", (16.0, 15.98, 16.01)),
+        ("Feature;Meas;Nominal;USL;LSL", "A;16.001;16;16.010;15.990", (16.0, 15.99, 16.01)),
+        ("Feature;Meas;USL;LSL", "A;16.001;16.010;15.990", (None, 15.99, 16.01)),
+        ("Feature;Meas;Nominal;Upper Tol;Lower Tol;Unit", "A;0.5;0.5;0.001;-0.001;inch", (12.7, 12.6746, 12.7254)),
+        ("Feature;Meas;Nominal [in];Upper Tol [µm];Lower Tol [µm]", "A;0.5;0.5;10;-10", (12.7, 12.69, 12.71)),
+        ("Feature;Meas;Nominal;Upper Tol;Lower Tol", "A;16.001;16;0.010;0.005", "is above 0: a deviation"),
+        ("Feature;Meas;Upper Tol;Lower Tol", "A;16.001;0.010;-0.005", "from a nominal size, which is missing"),
+        ("Feature;Meas;Nominal;Upper Tol", "A;16.001;16;0.010", "the lower limit is missing"),
+        (
+            "Feature;Meas;Nominal;USL;LSL",
+            "A;16;16;16.1;15.9\nA;16;16;16.2;15.9",
+            "lines 2 and 3 give it different limits",
+        ),
+        ("Feature;Meas;Nominal;USL;LSL", "A;16;16;about;15.9", "'about' is not a number"),
+    ],
+)
+def test_the_limits_of_a_row(tmp_path: Path, head: str, row: str, found: tuple[float | None, ...] | str) -> None:
+    path = tmp_path / "a.csv"
+    path.write_text(f"{head}\n{row}\n")
+    [content] = drawn.contents(look(path, Wishes()))
+    if isinstance(found, str):
+        assert found in content.not_new
+    else:
+        assert content.not_new == ""
+        assert (content.nominal, content.lower, content.upper) == pytest.approx(found)
+
+
+OBJECTS = [
+    {"characteristic": name, "measured": size, "part": part}
+    for part, last in ((815, 16.003), (816, 16.004), (817, 16.005))
+    for name, size in (("Seal_1_X", 0.001), ("Seal_1_Y", 0.0), ("Seal_1_D", last))
+]
+
+
+@pytest.mark.parametrize("kind", ["json", "ndjson"])
+def test_objects_are_sorted_by_their_characteristic_as_rows_are(plant: Plant, tmp_path: Path, kind: str) -> None:
+    path, text = tmp_path / f"a.{kind}", json.dumps(OBJECTS) if kind == "json" else "\n".join(map(json.dumps, OBJECTS))
+    keys = {name: plant.shop.another(kind, **LENGTHS["16" if name[-1] == "D" else "0"]) for name in PARTS}
+    alone = plant.shop.another("d16", **LENGTHS["16"])
+    path.write_text(text)
+    for ask in (plant.command(path, characteristic=alone), plant.page(path, alone)):
+        assert "none is called" in ask
+    assert plant.stored(alone) == []
+    for name, key in keys.items():
+        text = text.replace(name, key)
+    path.write_text(text)
+    assert plant.command(path) == ""
+    assert {name: [size for size, _at in plant.stored(key)] for name, key in keys.items()} == PARTS
+    path.write_text(text.replace(keys["Seal_1_D"], alone))
+    assert plant.page(path, alone) == ""
+    assert [size for size, _at in plant.stored(alone)] == PARTS["Seal_1_D"], "its own rows only"
+
+
+def test_a_table_by_rest_says_how_it_was_understood(plant: Plant, tmp_path: Path) -> None:
+    key = plant.shop.another("rest", **D40)
+    text = "Time;Wert [µm];Remark\n18.11.2025 06:05;40001;chip\n"
+    answer = plant.table(tmp_path / "a.csv", text, characteristic=key, timezone=ZONE, dry_run=True)
+    assert (answer["stored"], answer["unit"], answer["ignored"]) == (1, "um", ["Remark"])
+    assert answer["columns"] == {"measured": "Wert [µm]", "measured_at": "Time"}
+    assert plant.stored(key) == []
+    for name, words in (("a.dfq", "/readings/aqdef"), ("a.xlsx", "a workbook is saved as CSV")):
+        assert words in str(plant.table(tmp_path / name, text, characteristic=key))
+    plant.shop.call("POST", "/readings/table", 404, name="a.csv", content=text, characteristic="nobody")
+    wide = plant.table(tmp_path / "a.csv", f"{key}\n40.001\n", characteristics={"1": key})
+    assert [(each["name"], each["stored"]) for each in wide["characteristics"]] == [(key, 1)]
+
+
+def test_of_such_a_table_one_characteristic_gets_its_own_rows_or_a_question(plant: Plant, tmp_path: Path) -> None:
     path = tmp_path / "chr.txt"
     path.write_text(LONG)
-    layout = look(path, Wishes())
-    assert layout.names == tuple(PARTS)
-    for place, name in enumerate(layout.names):
-        own = layout_of(layout, Column(place, "x"), None)
-        found = [each.reading for each in lines(path, own, "x") if isinstance(each, Line)]
-        assert [(each.measured, each.part) for each in found] == list(
-            zip(PARTS[name], ("815", "816", "817"), strict=True)
-        )
-    assert layout.of_one("d16", "Seal_1_D").only == "Seal_1_D"
-    with pytest.raises(Invalid, match="none is called 'd16'"):
-        layout.of_one("d16", "Bore")
+
+    def by_command(key: str) -> str:
+        return plant.command(path, characteristic=key)
+
+    def by_page(key: str) -> str:
+        return plant.page(path, key)
+
+    for ask in (by_command, by_page):
+        key = plant.shop.another("d16", **LENGTHS["16"])
+        assert "none is called" in ask(key)
+        assert plant.stored(key) == []
+        path.write_text(LONG.replace("Seal_1_D", key))
+        assert ask(key) == ""
+        assert [size for size, _at in plant.stored(key)] == PARTS["Seal_1_D"]
+        path.write_text(LONG)
     columns = {"characteristic": "id", "measured": "actual", "part": "partnb"}
     readings, faults, _words = bridged(path, {name: name.lower() for name in PARTS}, columns=columns)
     assert (len(readings), faults) == (9, [])
 
 
-def test_a_row_of_such_a_table_may_name_its_unit(tmp_path: Path) -> None:
-    path = tmp_path / "chr.txt"
-    path.write_text("id,actual,nominal,unit\nA,1.5,1,inch\nB,20,20,deg\n")
-    layout = look(path, Wishes())
-    a, b = (list(lines(path, layout_of(layout, Column(place, "x"), None), "x")) for place in (0, 1))
-    assert [each.reading.measured for each in a if isinstance(each, Line)] == [38.1]
-    assert [each.line for each in b if isinstance(each, Flaw)] == [3]
+def described(*lines: str) -> list[str]:
+    head = ["K0100 1", "K1001 {part}", "K1002 Ring", "K2001/1 D20", "K2002/1 Bore 20"]
+    return [*head, "K2101/1 20", "K2110/1 19.9", "K2111/1 20.1", "K2142/1 mm", *lines]
+
+
+def row(size: float, time: str, rest: str = "") -> str:
+    return f"{size}{F}0{F}{time}{rest}"
+
+
+SIX = "18.11.2025/06:05:00"
+Q_DAS = f"{F}{F}#{F}0{F}0{F}0{F}{F}0{F}{F}"
+AQDEF: dict[str, tuple[list[str], Readings]] = {
+    "12 fields": (
+        described(*(row(20 + at / 1000, f"18.11.2025/06:0{5 + at}:00", Q_DAS) for at in range(3))),
+        morning(20.0, 20.001, 20.002),
+    ),
+    "12 fields and K2004": (described("K2004/1 0", row(20.001, SIX, Q_DAS)), morning(20.001)),
+    "1992": (described(row(20.001, "07.05.1992/13:43:21")), [(20.001, "1992-05-07T11:43:21")]),
+    "bytes of graphics": (described("K5003/1 \0", "K5007/1 \xff\0\xff\xff", row(20.001, SIX)), morning(20.001)),
+    "like values": (
+        described(*(row(20.001, SIX, f"{F}{F}#{F}{nest}") for nest in (1, 1, 2)), row(20.001, SIX, f"{F}{F}#{F}1")),
+        [(20.001, MORNING.format(5))] * 4,
+    ),
+    "a torque": (
+        [
+            *("K0100 2", "K1001 {part}", "K2001/1 M8", "K2101/1 25", "K2110/1 20", "K2111/1 30", "K2142/1 Nm"),
+            *("K2001/2 D20", "K2101/2 20", "K2110/2 19.9", "K2111/2 20.1", "K2142/2 mm"),
+            row(25.1, SIX) + C + row(20.004, SIX),
+        ],
+        morning(20.004),
+    ),
+}
+
+
+@pytest.mark.parametrize("name", AQDEF)
+def test_aqdef_means_the_same_at_every_door(plant: Plant, tmp_path: Path, name: str) -> None:
+    lines, good = AQDEF[name]
+    machine, doors = plant.shop.machine, {}
+    for door in ("cli", "page", "rest", "bridge"):
+        part = plant.shop.another("part").replace("-", "")
+        path = tmp_path / f"{door}.dfq"
+        path.write_bytes("\r\n".join([*lines, ""]).replace("{part}", part).encode("latin-1"))
+        doors[door] = path, f"{part}-d20"
+    path, key = doors["cli"]
+    assert plant.command(path, create_missing=True, machine=machine) == ""
+    assert plant.stored(key) == good
+    assert plant.command(path, create_missing=True, machine=machine) == "", "twice is harmless"
+    assert plant.stored(key) == good
+    path, key = doors["page"]
+    assert plant.page(path, all="new", machine=machine) == ""
+    assert plant.stored(key) == good
+    path, key = doors["rest"]
+    text = path.read_bytes().decode("latin-1").replace("\0", "")
+    answer = plant.shop.call(
+        "POST", "/readings/aqdef", name="a.dfq", content=text, create_missing=True, machine=machine
+    )
+    assert (answer["stored"], answer["notes"]) == (len(good), [])
+    assert plant.stored(key) == good
+    path, _key = doors["bridge"]
+    readings, faults, words = bridged(path, {"D20": "d20"}, format="aqdef", others="skip")
+    assert (readings, faults) == (good, []), words

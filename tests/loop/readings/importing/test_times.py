@@ -54,6 +54,13 @@ CASES: dict[str, tuple[list[str], Answer]] = {
         ["1999-12-31T22:59:00", "1999-12-31T23:00:00"],
     ),
     "history": (["07.05.1992 13:43:21"], ["1992-05-07T11:43:21"]),
+    "a default alone": (["01.01.1970 00:00:00"] * 300, [None] * 300),
+    "zeros": (["18.11.2025 06:05:00", "00.00.0000 00:00:00"], ["2025-11-18T05:05:00", None]),
+    "zeros alone": (["00.00.0000 00:00:00", "30.12.1899 00:00:00"], [None, None]),
+    "dated below many without": (
+        ["01.01.1900 00:00:00"] * 300 + ["18.11.2025 06:05:00"],
+        [*[None] * 300, "2025-11-18T05:05:00"],
+    ),
 }
 
 
@@ -122,11 +129,19 @@ def test_aqdef_is_read_alike_by_import_and_bridge(tmp_path: Path, name: str) -> 
     check(through_the_bridge(path, format="aqdef", names={"D40": "shaft-1"}), expected)
 
 
-def test_where_no_line_has_a_time_a_default_is_refused_by_the_import_and_now_for_a_bridge(tmp_path: Path) -> None:
-    path = table(tmp_path / "a.csv", ["01.01.1970 00:00:00"])
-    check(imported(path), DEFAULT)
-    columns = {"measured_at": "time", "measured": "actual"}
-    check(through_the_bridge(path, names={"*": "shaft-1"}, columns=columns, decimal=","), [None])
+@pytest.mark.parametrize(
+    "times", [["30.12.1899 06:05:00", "30.12.1899 06:06:00"], ["01.01.2000 00:00:00"]], ids=["of a day", "a midnight"]
+)
+def test_a_default_that_may_say_something_is_refused_where_no_line_has_another(
+    tmp_path: Path, times: list[str]
+) -> None:
+    check(imported(table(tmp_path / "a.csv", times)), DEFAULT)
+
+
+def test_a_column_without_a_single_time_is_none_of_times(tmp_path: Path) -> None:
+    for times in (["01.01.1970 01:00:00"] * 2, [""] * 300, ["0000-00-00 00:00:00", ""]):
+        layout = look(table(tmp_path / "a.csv", times), Wishes(timezone=ZONE, mapping={"measured": "actual"}))
+        assert layout.columns == {"measured": (1,)}, "so it is said that all get the time of the import"
 
 
 @pytest.mark.parametrize(

@@ -209,7 +209,7 @@ def _store_all(
         taken = dict.fromkeys((each.characteristic.key for each in known), 1)
     for index, content in wanted.items():
         created = chosen[index] == NEW
-        key = _set_up(session, content, machine, actor, taken) if created else chosen[index]
+        key = set_up(session, content, machine, actor, taken) if created else chosen[index]
         taken.setdefault(key, 1)
         key = characteristic_queries.characteristic_named(session, key).characteristic.key
         entry = queries.entry_of(session, key)
@@ -249,7 +249,8 @@ def _store(
     return Result(content, entry.characteristic, created, summary, excluded, doubts)
 
 
-def _set_up(session: Session, content: Content, machine: str | None, actor: str, taken: dict[str, int]) -> str:
+def set_up(session: Session, content: Content, machine: str | None, actor: str, taken: dict[str, int]) -> str:
+    """Set up a characteristic of a file with the limits that it has there; its key. taken: as `matching.key_for` has it."""
     if machine is None:
         raise Invalid.at("machine", _("say on which machine new characteristics are set up"))
     given = characteristics.CharacteristicIn(

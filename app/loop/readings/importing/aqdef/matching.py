@@ -98,7 +98,7 @@ def _content(description: Description, each: Characteristic, unit: str | None) -
         lower,
         upper,
         obstacle,
-        "" if obstacle else _not_new(nominal, lower, upper),
+        "" if obstacle else not_new(nominal, lower, upper),
         tuple(said.remarks),
         machine,
         None if obstacle else natural,
@@ -180,10 +180,12 @@ def _natural(fields: Mapping[str, str], name: str, nominal: float | None, said: 
     return NaturalLimit.NONE if ordinary else None
 
 
-def _not_new(nominal: float | None, lower: float | None, upper: float | None) -> str:
+def not_new(
+    nominal: float | None, lower: float | None, upper: float | None, names: tuple[str, str] = ("K2110", "K2111")
+) -> str:
+    """The reason why it cannot be set up with these limits, mm; names: of lower and upper limit in its file."""
     if lower is None or upper is None:
-        missing = "K2110" if upper is not None else "K2111"
-        return _("it has no tolerance: {field} is missing").format(field=missing)
+        return _("it has no tolerance: {field} is missing").format(field=names[0 if upper is not None else 1])
     if upper - lower < 1e-6:
         return _("its upper limit is not above its lower one")
     if nominal is not None and not lower - 1000 <= nominal <= upper + 1000:

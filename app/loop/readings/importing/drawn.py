@@ -1,0 +1,80 @@
+"""Characteristics that a table itself describes, row by row: nominal size and limits, by which missing ones are set up."""
+
+from collections.abc import Collection
+
+from app.core.natural import NaturalLimit
+from app.core.number_text import NotANumber, read_number
+from app.files.formats.cell_values import Unreadable, folded
+from app.files.formats.column_names import LOWER_LIMITS, UPPER_LIMITS
+from app.files.formats.units import UnknownUnit, agreed, in_mm, unit_in
+from app.language.i18n import _
+from app.loop.readings.importing.aqdef.matching import Content, not_new
+from app.loop.readings.importing.layout import Drawn, Layout, is_unsigned
+
+_SIZES = frozenset(map(folded, (*UPPER_LIMITS, *LOWER_LIMITS)))
+
+
+class _Wrong(ValueError):
+    """A characteristic that its rows do not describe; the words say why."""
+
+
+def contents(layout: Layout) -> list[Content]:
+    """The characteristics that the rows name, as far as they describe them, in the order of `layout.names`."""
+    return [_content(place, name, drawn, layout) for place, (name, drawn) in enumerate(layout.drawn.items())]
+
+
+def missing(layout: Layout, chosen: Collection[int]) -> tuple[list[Content], list[Content]]:
+    """Those that nobody has chosen: which can be set up, and which cannot."""
+    others = [each for each in contents(layout) if each.index not in chosen]
+    return [each for each in others if not each.not_new], [each for each in others if each.not_new]
+
+
+def _content(place: int, name: str, drawn: Drawn, layout: Layout) -> Content:
+    try:
+        nominal, lower, upper = _limits(drawn, layout)
+    except _Wrong as error:
+        return Content(place, "", "", "", name, "mm", not_new=str(error))
+    natural = None
+    if lower is None and upper is not None and not nominal:
+        nominal, lower, natural = 0.0, 0.0, NaturalLimit.LOWER  # a form error
+    reason = not_new(nominal, lower, upper, (_("the lower limit"), _("the upper limit")))
+    return Content(place, "", "", "", name, "mm", nominal, lower, upper, not_new=reason, natural_limit=natural)
+
+
+def _limits(drawn: Drawn, layout: Layout) -> tuple[float | None, float | None, float | None]:
+    """Nominal size, lower and upper limit, mm. Raises `_Wrong`."""
+    if drawn.other:
+        words = _("lines {first} and {other} give it different limits, nominal sizes or units")
+        raise _Wrong(words.format(first=drawn.line, other=drawn.other))
+    nominal = _length(drawn, layout, "nominal")
+    lower, upper = (_length(drawn, layout, side) for side in ("lower", "upper"))
+    if is_unsigned(layout.named("lower")) and lower is not None:
+        lower = -abs(lower)
+    sizes = []
+    for side, value in (("lower", lower), ("upper", upper)):
+        form_error = lower is None and not nominal  # its upper limit is both
+        if value is None or form_error or folded(layout.named(side)) in _SIZES:
+            sizes.append(value)
+        elif nominal is None:
+            raise _Wrong(
+                _("its {column} is a deviation from a nominal size, which is missing").format(column=layout.named(side))
+            )
+        else:
+            sizes.append(round(nominal + value, 9))
+    if lower is not None and upper is not None and lower > 0 and sizes[0] != lower:
+        words = _("its {column} is above 0: a deviation, or one without its sign? Nobody can tell")
+        raise _Wrong(words.format(column=layout.named("lower")))
+    return nominal, sizes[0], sizes[1]
+
+
+def _length(drawn: Drawn, layout: Layout, field: str) -> float | None:
+    text = getattr(drawn, field)
+    if not text:
+        return None
+    try:
+        unit = agreed(unit_in(layout.named(field)) or layout.said_unit, drawn.unit)
+        length: float = in_mm(read_number(text), unit)
+    except (NotANumber, Unreadable, UnknownUnit) as error:
+        reason = str(error) if isinstance(error, Unreadable) else _("is not a number, or in no unit that is known")
+        raise _Wrong(f"{layout.named(field)} {text[:40]!r} {reason}") from None
+    return length
