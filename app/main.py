@@ -56,7 +56,7 @@ from app.loop.notes import api as notes
 from app.loop.notes import pages as note_pages
 from app.loop.programs import api as programs
 from app.loop.readings import api as readings
-from app.loop.readings import aqdef_api, results, table_api
+from app.loop.readings import aqdef_api, results_actions, table_api
 from app.loop.readings.by_hand import api as by_hand
 from app.loop.readings.door import Directory, ReadingsDoor
 from app.loop.readings.importing import pages as import_pages
@@ -227,7 +227,7 @@ JOBS: tuple[PeriodicJob, ...] = (
     report_actions.JOB,
     signals_actions.JOB,
     capability_actions.JOB,
-    results.JOB,
+    results_actions.JOB,
 )
 
 

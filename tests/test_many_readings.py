@@ -22,7 +22,8 @@ from app.jobs.actions import run_jobs
 from app.loop.characteristics import actions as characteristics
 from app.loop.characteristics import queries as characteristics_now
 from app.loop.characteristics.schemas import CharacteristicIn
-from app.loop.readings import exporting, queries, results
+from app.loop.readings import exporting, queries
+from app.loop.readings import results_actions as results
 from app.loop.readings.importing.actions import import_readings
 from app.loop.readings.importing.layout import Wishes, look
 from app.loop.readings.schemas import ReadingIn

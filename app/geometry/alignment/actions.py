@@ -21,8 +21,8 @@ from app.geometry.alignment.schemas import AlignmentIn, AlignmentRecomputeIn, Pa
 from app.geometry.alignment.tables import Alignment
 from app.language.i18n import _
 from app.loop.machines.queries import lock_machines
-from app.loop.readings import actions as readings
 from app.loop.readings import queries as reading_queries
+from app.loop.readings import results_actions as readings
 from app.loop.tables.machines import Machine
 from app.loop.warnings import actions as warned
 from app.loop.warnings.queries import bounds_of, unacknowledged

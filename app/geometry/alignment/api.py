@@ -9,7 +9,7 @@ from app.geometry.alignment import actions, queries
 from app.geometry.alignment.answers import AlignmentOut, alignment_out
 from app.geometry.alignment.schemas import AlignmentIn, AlignmentRecomputeIn, PalletIn
 from app.loop.machines.queries import machine_for, only_machine
-from app.loop.readings import actions as readings
+from app.loop.readings import results_actions as readings
 from app.web.api import After, Limit, MachineFilter, api_router, problems, sent_again
 from app.web.deps import SessionDep
 from app.web.fields import Page, page_of

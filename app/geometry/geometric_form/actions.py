@@ -22,8 +22,8 @@ from app.geometry.geometric_form.queries import FormRow
 from app.geometry.geometric_form.schemas import FormIn, stored
 from app.geometry.geometric_form.tables import FormEvaluation, FormMeasurement
 from app.language.i18n import _
-from app.loop.readings import actions as readings
 from app.loop.readings import queries as streams
+from app.loop.readings import results_actions as readings
 from app.loop.tables.machines import Machine
 from app.web.created import Created, sent_before
 

@@ -29,8 +29,8 @@ from app.language.i18n import _
 from app.language.times import plant_zone
 from app.loop.alarms import actions as alarms
 from app.loop.machines.queries import lock_machines
-from app.loop.readings import actions as readings
 from app.loop.readings import queries as reading_queries
+from app.loop.readings import results_actions as readings
 from app.loop.tables.machines import Machine
 from app.web.created import Created, sent_before
 from app.web.fields import AHEAD, EARLIEST

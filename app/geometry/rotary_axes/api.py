@@ -23,7 +23,7 @@ from app.geometry.rotary_axes.result_values import UNITS
 from app.geometry.rotary_axes.schemas import EnterIn, KinematicsPlanIn, RestoreIn, RunIn
 from app.language.i18n import _
 from app.loop.machines.queries import hold_machine, machine_for, machine_named, only_machine
-from app.loop.readings import actions as readings
+from app.loop.readings import results_actions as readings
 from app.loop.timeline.queries import with_events_of_machine
 from app.web.api import (
     FIGURE,

@@ -19,7 +19,7 @@ from app.geometry.rotary_axes.schemas import MOST_PROTOCOL, RunIn
 from app.geometry.rotary_axes.view import COMMON
 from app.language.i18n import _
 from app.loop.machines.queries import machine_named, machines
-from app.loop.readings import actions as readings
+from app.loop.readings import results_actions as readings
 from app.web.deps import SessionDep, texts
 from app.web.forms import parsed
 from app.web.templates import page

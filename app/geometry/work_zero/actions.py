@@ -23,8 +23,8 @@ from app.geometry.work_zero.tables import Fixture, WorkZero
 from app.language.i18n import _
 from app.loop.alarms import actions as alarms
 from app.loop.machines.queries import lock_machines
-from app.loop.readings import actions as readings
 from app.loop.readings import queries as reading_queries
+from app.loop.readings import results_actions as readings
 from app.loop.tables.machines import Machine
 from app.loop.warnings import actions as warned
 from app.web.created import Created, sent_before

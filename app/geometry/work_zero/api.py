@@ -21,7 +21,7 @@ from app.geometry.work_zero.figures import Mark
 from app.geometry.work_zero.schemas import FixtureIn, ZeroIn, ZeroRecomputeIn
 from app.loop.machines.queries import hold_machine, machine_for, machine_of, only_machine
 from app.loop.machines.wording import file_name, no_old_offset, no_such_offset
-from app.loop.readings import actions as readings
+from app.loop.readings import results_actions as readings
 from app.loop.timeline.queries import with_events_of_machine
 from app.web.api import (
     FIGURE,

@@ -19,7 +19,7 @@ from app.geometry.work_zero.tables import WorkZero
 from app.loop.machines import queries as machines
 from app.loop.machines.queries import machine_named, machine_of
 from app.loop.machines.wording import texts_by_control
-from app.loop.readings import actions as readings
+from app.loop.readings import results_actions as readings
 from app.web.deps import FormDep, Number, SessionDep, Sought, Word
 from app.web.forms import parsed, typed
 from app.web.paging import address, part_of

@@ -38,6 +38,7 @@ from app.loop.tables.readings import Stream
 from app.loop.tables.tools import Correction
 from app.loop.tools import actions as offsets
 from app.loop.tools import queries as offset_queries
+from app.loop.tools import sister_actions
 from app.loop.tools.alarm_kinds import OFFSET_DIFFERS
 
 Outcome = list[dict[str, Any]]
@@ -228,9 +229,9 @@ def _sister_tool(session: Session, row: AlarmRow, comment: str, caller: Caller) 
     number = row.alarm.tool_memory
     assert number is not None
     tool = offset_queries.tool(session, row.machine, number)
-    if tool.sister is not None and not offsets.on_tool(session, row.machine, number):
+    if tool.sister is not None and not sister_actions.on_tool(session, row.machine, number):
         return [{"code": "switched_already", "tool": number, "sister": tool.sister}]
-    done = offsets.switch_to_sister(session, row.machine, number, comment, caller)
+    done = sister_actions.switch_to_sister(session, row.machine, number, comment, caller)
     outcome: Outcome = [
         {"code": "switched", "tool": number, "sister": done.sister, "characteristics": done.characteristics}
     ]

@@ -9,8 +9,8 @@ from app.errors import Invalid
 from app.language.i18n import _
 from app.loop.alarm_response import queries
 from app.loop.alarm_response.queries import AlarmRow
-from app.loop.readings import actions as readings
 from app.loop.readings import queries as reading_queries
+from app.loop.readings.by_hand.actions import HandResult, measure
 
 
 class ByHand(NamedTuple):
@@ -49,11 +49,11 @@ def keep(session: Session, row: AlarmRow, found: ByHand, comment: str, caller: C
             do=_("Name one of its readings."),
         )
     good = None if found.verdict is None else found.verdict == "good"
-    measurement = readings.measure_by_hand(
+    measurement = measure(
         session,
         entry,
         sequence,
-        readings.HandResult(found.measured, good, comment),
+        HandResult(found.measured, good, comment),
         caller.name,
         alarm=row.alarm.id,
         fields=("hand_measured", "hand_verdict"),

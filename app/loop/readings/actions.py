@@ -13,24 +13,8 @@ from app.language.i18n import _
 from app.language.times import in_sentence
 from app.loop.machines.queries import lock_machines
 from app.loop.readings import queries
-from app.loop.readings.by_hand.actions import HandResult
-from app.loop.readings.by_hand.actions import measure as measure_by_hand
-from app.loop.readings.by_hand.actions import measure_typed as measure_typed_by_hand
 from app.loop.readings.records import Entry
-from app.loop.readings.results import Source, ask_for, push_results, pushing
 from app.loop.tables.readings import Exclusion, Reading, Stream
-
-__all__ = [
-    "HandResult",
-    "Source",
-    "ask_for",
-    "exclude",
-    "exclude_all",
-    "measure_by_hand",
-    "measure_typed_by_hand",
-    "push_results",
-    "pushing",
-]
 
 
 def exclude(session: Session, entry: Entry, sequence: int, actor: str, reason: str) -> Exclusion:

@@ -29,10 +29,8 @@ from app.loop.tables.tools import OPEN, AverageMemory, Correction, Tool, ToolEve
 from app.loop.tools import queries, wording
 from app.loop.tools.alarm_kinds import PAUSING
 from app.loop.tools.events import average_changed, correction_changed, tool_changed
-from app.loop.tools.sisters import on_tool, switch_to_sister
 from app.loop.tools.superseding import supersede
 
-__all__ = ["on_tool", "switch_to_sister"]  # so that the others find them with what else is done to tools
 Verb = Literal["rejected", "approve", "release"]
 FROM: dict[str, tuple[str, ...]] = {"rejected": OPEN, "approve": ("awaiting_approval",), "release": ("held",)}
 INTO = {"rejected": "rejected", "approve": "pending", "release": "pending"}

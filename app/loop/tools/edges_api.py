@@ -11,7 +11,7 @@ from app.loop.tools.edges import describe_tool
 from app.loop.tools.figures import LifeBar, lives_figure
 from app.loop.tools.lives_queries import lives
 from app.loop.tools.schemas import ToolOut, tool_out
-from app.loop.tools.sisters import switch_to_sister
+from app.loop.tools.sister_actions import switch_to_sister
 from app.web.api import FIGURE, MachineKey, Theme, api_router, chart_answer, problems
 from app.web.deps import SessionDep
 from app.web.etags import guarded

@@ -11,7 +11,7 @@ from app.core.plausibility import empirical_value_warnings, offset_warnings
 from app.language.i18n import _, ngettext
 from app.language.numbers import mm, typed_length, um
 from app.loop.tables.machines import Machine
-from app.loop.tools import actions, applying, queries, sisters, wording
+from app.loop.tools import actions, applying, queries, sister_actions, wording
 from app.loop.tools.actions import Decided
 from app.loop.tools.edge_schemas import SisterIn
 from app.loop.tools.queries import AverageRow, CorrectionRow, ToolRow
@@ -250,7 +250,7 @@ def _change(on: OfTool, change: ToolChange) -> None:
 
 
 def _switch(on: OfTool, why: SisterIn) -> Said:
-    done = sisters.switch_to_sister(on.session, on.machine, on.number, why.reason, on.caller)
+    done = sister_actions.switch_to_sister(on.session, on.machine, on.number, why.reason, on.caller)
     return Said("sister", done.sister)
 
 

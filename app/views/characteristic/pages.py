@@ -32,6 +32,7 @@ from app.loop.notes import queries as notes
 from app.loop.notes.queries import NEWEST, NoteRow
 from app.loop.readings import actions as readings
 from app.loop.readings import queries as reading_queries
+from app.loop.readings.by_hand.actions import measure_typed
 from app.loop.summaries import queries as statistics
 from app.loop.summaries import wording as statistics_wording
 from app.loop.summaries.queries import MOST_IN_HISTOGRAM, Window
@@ -242,7 +243,7 @@ def send_measured_by_hand(
     entry = reading_queries.entry_of(session, characteristic)
     assert entry is not None
     try:
-        readings.measure_typed_by_hand(session, entry, sequence, form, caller.name)
+        measure_typed(session, entry, sequence, form, caller.name)
     except InbandError as error:
         if error.status == 404:
             raise

@@ -12,7 +12,7 @@ from sqlalchemy.exc import DBAPIError
 
 from app.db.engine import Database
 from app.geometry.work_zero.tables import WorkZero
-from app.loop.readings.actions import push_results
+from app.loop.readings.results_actions import push_results
 from tests.conftest import Server
 from tests.geometry.work_zero.bench import POCKET, moved, post
 from tests.shop import Shop
