@@ -276,8 +276,6 @@ def _lock_admins(session: Session) -> None:
 def _keep_an_admin(session: Session, person: Person) -> None:
     if person.disabled_at is None and queries.active_admins(session) <= 1:
         raise Conflict(
-            _("{name} is the only administrator left; without one nobody could let people in.").format(
-                name=person.name
-            ),
-            _("Make somebody else an administrator first."),
+            _("{name} is the only administrator left; without one no user could be added.").format(name=person.name),
+            _("Make another user an administrator first."),
         )

@@ -46,7 +46,7 @@ class Caller:
             _("This needs the role {needed}; {name} has the role {role}.").format(
                 needed=role, name=self.name, role=self.role
             ),
-            _("Ask an administrator for the role, or somebody who has it to do this."),
+            _("Ask an administrator for the role, or a user who has it to do this."),
         )
 
     def must_at(self, machine_id: int, role: Role) -> None:

@@ -186,7 +186,7 @@ def add_badge(session: Session, person_id: int, code: str, actor: str) -> Person
     person = _person(session, person_id)
     code_hash = looked_up(code)
     if session.get(Badge, code_hash) is not None:
-        raise Conflict(_("This badge is bound to somebody already."), _("Remove it there first, or use another badge."))
+        raise Conflict(_("This badge is bound to a user already."), _("Remove it there first, or use another badge."))
     session.add(Badge(code_hash=code_hash, person_id=person.id))
     session.flush()
     record(session, actor, "badge bound", f"person/{person.name}")

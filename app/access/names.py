@@ -87,7 +87,7 @@ def of_person(name: str, others: Iterable[str]) -> str:
         raise Conflict(
             _("{name} looks like {other}, who is there already.").format(name=name, other=other),
             _("Choose another name, for example with the first letter of the family name."),
-            errors=[FieldError("name", _("looks like the name of somebody else"))],
+            errors=[FieldError("name", _("looks like the name of another user"))],
         )
     return name
 

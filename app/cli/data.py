@@ -311,7 +311,7 @@ def export_file(
     ],
     since: Annotated[str | None, typer.Option("--from", envvar="INBAND_FROM", help=SINCE)] = None,
     until: Annotated[str | None, typer.Option("--to", envvar="INBAND_TO", help=UNTIL)] = None,
-    last: Annotated[int | None, typer.Option(envvar="INBAND_LAST", min=1, help="Only so many, the last ones.")] = None,
+    last: Annotated[int | None, typer.Option(envvar="INBAND_LAST", min=1, help="Only the last N.")] = None,
     timezone: Zone = None,
     format_: Annotated[Format | None, typer.Option("--format", envvar="INBAND_FORMAT", show_default="csv")] = None,
     output: Annotated[

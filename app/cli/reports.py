@@ -30,9 +30,7 @@ def report_files(
     until: Annotated[str | None, typer.Option("--to", envvar="INBAND_TO", help=UNTIL)] = None,
     last: Annotated[
         int | None,
-        typer.Option(
-            envvar="INBAND_LAST", min=1, help="Only so many, the last ones.", show_default="1000 if no period is named"
-        ),
+        typer.Option(envvar="INBAND_LAST", min=1, help="Only the last N.", show_default="1000 if no period is named"),
     ] = None,
     timezone: Zone = None,
     section: Annotated[

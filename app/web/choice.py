@@ -76,9 +76,7 @@ def period_on_page(
     return periods.period_of({"from": start, "to": end})
 
 
-Last = Annotated[
-    str | None, Query(pattern=r"^([1-9][0-9]{0,17}|all)$", description="The last so many readings, or `all`.")
-]
+Last = Annotated[str | None, Query(pattern=r"^([1-9][0-9]{0,17}|all)$", description="The last N readings, or `all`.")]
 First = Annotated[int | None, Query(ge=1, le=LARGEST_ID, description="From this reading on.")]
 Through = Annotated[int | None, Query(ge=1, le=LARGEST_ID, description="To this reading, itself included.")]
 

@@ -105,7 +105,7 @@ def _unique(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
     if len(values) != len(pairs):
         counted = Counter(name for name, _value in pairs)
         doubled = next(name for name, count in counted.items() if count > 1)
-        raise _DoubledError(_("says {name} twice; say it once").format(name=json.dumps(doubled)))
+        raise _DoubledError(_("gives {name} twice; give it once").format(name=json.dumps(doubled)))
     return values
 
 

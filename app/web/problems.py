@@ -200,7 +200,7 @@ async def _database(request: Request, error: Exception) -> Response:
         return answer(
             request,
             Conflict(
-                _("Somebody else has just stored something under the same name."), _("Load it again and look first.")
+                _("Another user has just stored something under the same name."), _("Load it again and look first.")
             ),
         )
     if isinstance(cause, psycopg.DataError) or state.startswith(BAD_DATA):

@@ -155,7 +155,7 @@ def compose(session: Session, body: PalletIn, caller: Caller) -> Created[Alignme
 
 
 def warned_of(session: Session, alignment: Alignment) -> bool:
-    """Return whether an alignment has warnings that nobody has acknowledged."""
+    """Return whether an alignment has warnings that are not acknowledged."""
     machine = session.get_one(Machine, alignment.machine_id)
     return bool(unacknowledged(session, machine.id, subject_of(alignment), warnings_of(alignment, machine)))
 

@@ -94,7 +94,7 @@ class ZeroIn(Body):
                 if name in fields:
                     raise PydanticCustomError(
                         "twice",
-                        _("{number} and {name} mean the same: say one").format(number=number, name=name),
+                        _("{number} and {name} mean the same: give one").format(number=number, name=name),
                         {"at": name},
                     )
                 fields[name] = fields.pop(number)

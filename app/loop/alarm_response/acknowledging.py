@@ -130,7 +130,7 @@ def _refuse(row: AlarmRow, action: Action, offset: float | None, changed_by: str
         if row.alarm.kind != OFFSET_DIFFERS.name:
             wrong.append(FieldError("action", _("offset_set answers alarms of the kind offset_differs only")))
         elif offset is None:
-            wrong.append(FieldError("offset", _("is missing: say which offset is true, in mm")))
+            wrong.append(FieldError("offset", _("is missing: enter the true offset, in mm")))
     elif changed_by is not None:
         wrong.append(FieldError("changed_by", _("is only meant with the action offset_set; leave it out")))
     if action == "measured_by_hand" and row.alarm.kind == "offset_differs":

@@ -39,7 +39,7 @@ def action_word(action: str) -> str:
         "keep_cutting": _("Keep cutting"),
         "false_reading": _("False reading"),
         "sister_tool": _("Switch to sister tool"),
-        "offset_set": _("Say which offset is true"),
+        "offset_set": _("Report the true offset"),
         "measured_by_hand": _("Measured by hand"),
         "noted": _("Noted"),
     }.get(action, action)

@@ -86,7 +86,7 @@ def kind_named(name: str) -> AlarmKind:
         name,
         word=lambda: name,
         sentence=lambda alarm: str(alarm.data.get("text") or name),
-        what_to_do=lambda: _("Look at it and say what it was."),
+        what_to_do=lambda: _("Check it and report what it was."),
         actions=("noted", "tool_replaced", "false_reading"),
     )
 

@@ -127,7 +127,7 @@ PROBE_FAULT = register(
         "probe_fault",
         word=lambda: _("Probe fault"),
         sentence=_probe_fault,
-        what_to_do=lambda: _("Clean the stylus, look at chips, coolant and the program. Then say what it was."),
+        what_to_do=lambda: _("Clean the stylus, check chips, coolant and the program. Then report what it was."),
         tone="stop",
         icon="probe_fault",
         actions=("false_reading", "noted", "tool_replaced"),
@@ -173,7 +173,7 @@ IMPLAUSIBLE = register(
             ),
         ),
         what_to_do=lambda: _(
-            "Look at the part and the stylus, and whether the right tool has cut it. Then say what it was."
+            "Check the part and the stylus, and that the right tool has cut it. Then report what it was."
         ),
         icon="jump",
         actions=("false_reading", "keep_cutting", "tool_replaced", "sister_tool", "noted"),

@@ -46,7 +46,7 @@ def _by_number(value: Any, names: dict[str, str]) -> Any:
             continue
         if name in fields:
             raise PydanticCustomError(
-                "twice", _("{number} and {name} mean the same: say one").format(number=number, name=name), {"at": name}
+                "twice", _("{number} and {name} mean the same: give one").format(number=number, name=name), {"at": name}
             )
         entry = fields.pop(number)
         codes = R_CODES.get(number, {})
@@ -219,10 +219,12 @@ class CalibrationPlanIn(Body):
     """Interval of calibration, and automatic or approved application of its results."""
 
     due_parts: Annotated[
-        int | None, Field(strict=True, ge=1, le=100_000_000, description="Due after so many parts; none: not by parts.")
+        int | None,
+        Field(strict=True, ge=1, le=100_000_000, description="Due after this number of parts; none: not by parts."),
     ] = None
     due_days: Annotated[
-        float | None, Field(strict=True, gt=0, le=36_500, allow_inf_nan=False, description="Due after so many days.")
+        float | None,
+        Field(strict=True, gt=0, le=36_500, allow_inf_nan=False, description="Due after this number of days."),
     ] = None
     acceptance: Annotated[
         Literal["accept", "automatic"],

@@ -221,7 +221,7 @@ def what_pairs_say(found: Comparison, empirical_value: float) -> str:
         ).format(n=found.missing, **values)
     if found.equal:
         return _(
-            "The machine reads {mean} too much in every one of {n} pairs: where nothing varies nobody can say how well that is known, and nothing is suggested. Read the gauge with one more decimal, or measure other parts. Who knows the value all the same sets the empirical value by hand, with the reason."
+            "The machine reads {mean} too much in every one of {n} pairs: where nothing varies it is unknown how well that is known, and nothing is suggested. Read the gauge with one more decimal, or measure other parts. Who knows the value all the same sets the empirical value by hand, with the reason."
         ).format(n=found.pairs, **values)
     text = _("The machine reads {mean} too much, with {confidence} confidence between {low} and {high}.").format(
         **values
@@ -231,7 +231,7 @@ def what_pairs_say(found: Comparison, empirical_value: float) -> str:
             step=um(found.step)
         )
     if found.outlier is not None:
-        text += " " + _("One pair stands out: look at it first.")
+        text += " " + _("One pair stands out: check it first.")
     if found.suggested is None:
         return text + " " + _("The empirical value {value} lies inside: the pairs agree with it.").format(**values)
     return text + " " + _("The empirical value {value} lies outside: {mean} is suggested.").format(**values)

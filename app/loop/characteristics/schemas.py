@@ -95,9 +95,11 @@ Part = Annotated[Text200, Field(description="The part it belongs to: drawing or 
 class CharacteristicIn(Body):
     """A characteristic to set up."""
 
-    key: Annotated[Slug, Field(description="Its name in addresses and readings; it stays for good.")]
+    key: Annotated[Slug, Field(description="Its name in addresses and readings; it cannot be changed later.")]
     name: Annotated[Text200, Field(description="What people call it, as on the drawing.")]
-    machine: Annotated[str, Field(description="The key of the machine that cuts and measures it; it stays for good.")]
+    machine: Annotated[
+        str, Field(description="The key of the machine that cuts and measures it; it cannot be changed later.")
+    ]
     part: Part | None = None
     unit: Annotated[Literal["mm"], Field(description="Of its lengths.")] = "mm"
     parameters: GivenParameters

@@ -196,11 +196,11 @@ def _of_values(problem: Problem, name: str) -> dict[str, str]:
     """Sentences about a single value, or one that is missing, by the code of the problem."""
     data = problem.data
     return {
-        "required": _("{name} is missing; say it").format(name=name),
+        "required": _("{name} is missing; enter it").format(name=name),
         "unknown": _("There is no parameter {name}; check the spelling or the R number").format(
             name=problem.field[:64]
         ),
-        "twice": _("{name} is said twice, also as {other}; say it once").format(
+        "twice": _("{name} is given twice, also as {other}; give it once").format(
             name=problem.field[:64], other=data.get("other")
         ),
         "not_a_number": _not_a_number(problem, name),

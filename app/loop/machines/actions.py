@@ -75,7 +75,7 @@ def change_machine(session: Session, key: str, change: MachineChange, actor: str
     machine = queries.machine_named(session, key)
     if change.key not in {None, key}:
         raise Invalid(
-            _("The key of a machine stays for good, because programs call the machine by it."),
+            _("The key of a machine cannot be changed, because programs refer to the machine by it."),
             _("Change the name instead, or set up another machine."),
             errors=[FieldError("key", _("cannot be changed"))],
         )

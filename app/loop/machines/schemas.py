@@ -100,7 +100,7 @@ PlausibleAxisShift = Annotated[
 class MachineIn(Body):
     """A machine to set up."""
 
-    key: Annotated[Slug, Field(description="Its name in addresses and keys; it stays for good.")]
+    key: Annotated[Slug, Field(description="Its name in addresses and keys; it cannot be changed later.")]
     name: Annotated[Text200, Field(description="What people call it.")]
     control: Control
     type: Type = "other"

@@ -56,9 +56,7 @@ def get_aqdef(
         Query(max_length=2000, description="Keys of the characteristics, parted by commas.", examples=["shaft-d40"]),
     ],
     period: InPeriod,
-    last: Annotated[
-        int, Query(ge=1, le=MOST, description="Of each characteristic only so many, the last ones.")
-    ] = 10_000,
+    last: Annotated[int, Query(ge=1, le=MOST, description="Of each characteristic only the last N.")] = 10_000,
 ) -> Response:
     """Readings of several characteristics as an AQDEF file (Q-DAS, `.dfq`): values, validity, events, limits, catalogues."""
     keys = list(dict.fromkeys(key.strip() for key in characteristic.split(",") if key.strip()))

@@ -142,7 +142,7 @@ def _sentence(record: Record, parameters: Parameters) -> str:
         case Code.TOOL_WORN_HELD:
             text = _(
                 "Deviation %(worn)s has reached the wear limit %(wear)s: the tool is worn. "
-                "Correction %(number)s is held until somebody decides."
+                "Correction %(number)s is held until it is decided."
             )
         case Code.TOOL_WORN_RELEASED:
             text = _(
@@ -193,7 +193,7 @@ def _sentence(record: Record, parameters: Parameters) -> str:
         case Code.IMPLAUSIBLE:
             text = _(
                 "Deviation %(deviation)s lies more than the plausible %(jump)s from the level of the readings before: neither "
-                "wear nor scatter explains it. Correction %(number)s is held until somebody decides."
+                "wear nor scatter explains it. Correction %(number)s is held until it is decided."
             )
         case Code.REJECTED:
             text = _(

@@ -82,7 +82,7 @@ OFFSET_DIFFERS = register(
         "offset_differs",
         word=lambda: _("Offset differs"),
         sentence=_differs,
-        what_to_do=lambda: _("Look at the control which offset is true, and say so."),
+        what_to_do=lambda: _("Read the true offset at the control and report it."),
         actions=("offset_set", "tool_replaced"),
         comments={
             "offset_set": lambda: [

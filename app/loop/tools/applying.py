@@ -245,6 +245,6 @@ def _other_offset(correction: Correction, machine: Machine, offset_after: float)
         _(
             "Correction {number} of {machine} was confirmed with the offset {known} mm already, not {reported} mm. Nothing was changed."
         ).format(number=correction.number, machine=machine.key, known=correction.offset_after, reported=offset_after),
-        _("Tell the offset as it is now by a manual edit of tool {tool}.").format(tool=correction.tool_memory),
+        _("Enter the present offset by a manual edit of tool {tool}.").format(tool=correction.tool_memory),
         correction_status=correction.status,
     )

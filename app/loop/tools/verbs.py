@@ -199,7 +199,7 @@ CORRECTION: tuple[Verb[OfCorrection, Any], ...] = (
         title=lambda _on: _("Is correction {number} in the control?"),
         follows=lambda on: [
             _("The offset of tool {tool} changes by {amount}, to {after}.").format(**on.values),
-            _("Say what the control shows if it shows another offset."),
+            _("Enter what the control shows if it shows another offset."),
         ],
         size=_offset_shown,
         said=lambda: _("Correction {n} is applied."),

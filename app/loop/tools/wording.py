@@ -22,7 +22,7 @@ def why(correction: Correction) -> str | None:
         return reason
     if reason.startswith(EXPIRED):
         hours = reason.removeprefix(EXPIRED).strip()
-        return _("expired: nobody had it applied within {hours} h").format(hours=hours)
+        return _("expired: not applied within {hours} h").format(hours=hours)
     if reason.startswith(PAUSED):
         alarm = reason.removeprefix(PAUSED).strip()
         return _("the machine holds another offset than it was computed for (alarm {alarm})").format(alarm=alarm)
@@ -53,7 +53,7 @@ def status_explained(status: str) -> str:
     """The meaning of a status: the awaited action, or the final state."""
     return {
         "held": _("Waits for an operator: its reading said that the tool is worn, or was not plausible."),
-        "awaiting_approval": _("Waits until somebody approves it."),
+        "awaiting_approval": _("Waits for approval."),
         "pending": _("Waits for the machine to apply it."),
         "applied": _("Is in the offset."),
         "rejected": _("Was refused; it changes nothing."),
@@ -113,12 +113,12 @@ def _instead(correction: Correction, verb: str) -> str:
         if has_expired(correction):
             return _(
                 "If the machine has not applied it, leave it out: the next reading decides again. If it has, read the offset "
-                "at the control and tell it by a manual edit of tool {tool}, PUT /api/v1/machines/…/tools/{tool}."
+                "at the control and enter it by a manual edit of tool {tool}, PUT /api/v1/machines/…/tools/{tool}."
             ).format(tool=correction.tool_memory)
         if closed:
             return _(
                 "It must not be in the offset. If the machine has applied it, take {amount} back out of the offset, "
-                "or tell the offset as it is by a manual edit of tool {tool}."
+                "or enter the present offset by a manual edit of tool {tool}."
             ).format(amount=um(correction.amount), tool=correction.tool_memory)
         if correction.status == "held":
             return _("Acknowledge its alarm or release it first. A machine applies pending corrections only.")

@@ -88,7 +88,7 @@ def _feeler_unusual(values: dict[str, Any]) -> str:
 
 
 def _of_warned(values: dict[str, Any]) -> str:
-    return _("Alignment {number}, which this one is composed of, has warnings that nobody has acknowledged.").format(
+    return _("Alignment {number}, which this one is composed of, has warnings that are not acknowledged.").format(
         number=int(values["number"])
     )
 

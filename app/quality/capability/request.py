@@ -33,7 +33,7 @@ Last = Annotated[
     str | None,
     Query(
         pattern=r"^([1-9][0-9]{0,17}|all)$",
-        description="Of the last so many readings, or of `all`; the last 1000 where neither this nor a time is given.",
+        description="Of the last N readings, or of `all`; the last 1000 where neither this nor a time is given.",
     ),
 ]
 OneSide = Annotated[

@@ -118,7 +118,7 @@ def correct_study(session: Session, number: int, given: CorrectionIn, caller: Ca
         )
         raise Conflict(
             f"{wrong}.",
-            _("Look at it; store yours again if it is to replace it."),
+            _("Review it. Save yours again to replace it."),
             errors=[FieldError("seen_revision", wrong)],
         )
     current = _served(session, study.machine, study.characteristic)

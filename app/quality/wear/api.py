@@ -25,7 +25,7 @@ def get_wear(
     caller: AnyCaller,
     characteristic: CharacteristicKey,
     last: Annotated[
-        int | None, Query(ge=1, le=LARGEST_ID, description="Of the tool's readings only those among the last so many.")
+        int | None, Query(ge=1, le=LARGEST_ID, description="Of the tool's readings only those among the last N.")
     ] = None,
 ) -> WearOut:
     """Wear per part with its interval, parts left as a forecast, and whether the loop hunts.
@@ -48,7 +48,7 @@ def get_wear_figure(
         str | None,
         Query(
             pattern=r"^([1-9][0-9]{0,17}|all|tool)$",
-            description="The last so many readings, `all`, or `tool`: since the tool was changed.",
+            description="The last N readings, `all`, or `tool`: since the tool was changed.",
         ),
     ] = None,
     theme: Theme = "light",

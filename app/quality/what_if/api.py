@@ -71,7 +71,7 @@ def asked_for(
     delay: Annotated[int | None, Query(ge=0, le=LONGEST_DELAY, description="Parts; else as it was most often.")] = None,
     effect: Annotated[float, Query(ge=0.05, le=5, description="The share of a correction that acts.")] = 1.0,
     measured: Annotated[bool, Query(description="As measured on these readings, whatever `effect` says.")] = False,
-    last: Annotated[int | None, Query(ge=1, le=LARGEST_ID, description="The last so many readings.")] = None,
+    last: Annotated[int | None, Query(ge=1, le=LARGEST_ID, description="The last N readings.")] = None,
 ) -> WhatIfIn:
     """The question as an address says it."""
     return WhatIfIn.model_validate(

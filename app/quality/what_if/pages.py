@@ -195,7 +195,7 @@ def send_decision(request: Request, session: SessionDep, caller: Operator, numbe
     """Approve it, reject it or withdraw it, with a reason."""
     verb = form.get("do", "")
     if verb not in VERBS:
-        raise Invalid(_("Say what to do: approve, reject or withdraw."))
+        raise Invalid(_("Choose what to do: approve, reject or withdraw."))
     act, becomes = VERBS[verb]
     try:
         reason = parsed(ProposalDecisionIn, {"reason": form.get("reason", "").strip()}).reason

@@ -194,7 +194,7 @@ def past_of(session: Session, current: CurrentCharacteristic, window: Window) ->
             _("These are {count} readings; at most {most} can be replayed at once.").format(
                 count=window.count, most=LARGEST
             ),
-            _("Choose a shorter period, or the last so many readings."),
+            _("Choose a shorter period, or fewer readings."),
         )
     others = _others(session, current)
     columns = (*COLUMNS, "part") if others else COLUMNS

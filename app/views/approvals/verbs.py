@@ -29,7 +29,7 @@ class OfTool(OfMachine):
         if group is None or not group.approvable:
             raise NotFound(
                 _("No correction of tool {tool} awaits approval any more.").format(tool=self.number),
-                _("Somebody else has decided. Go back to the list of approvals."),
+                _("Another user has decided. Go back to the list of approvals."),
             )
         return group
 

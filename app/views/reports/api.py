@@ -44,7 +44,7 @@ def request_from_query(
         str | None,
         Query(
             pattern=r"^([1-9][0-9]{0,17}|all)$",
-            description="Only of the last so many readings, or of `all`; without any period of the last 1000.",
+            description="Only of the last N readings, or of `all`; without any period of the last 1000.",
         ),
     ] = None,
     section: Annotated[

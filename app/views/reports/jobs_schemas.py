@@ -35,7 +35,7 @@ class ReportsIn(Body):
         strict=True,
         ge=1,
         le=LARGEST_ID,
-        description="Of each only the last so many readings; without any period the last 1000. A very large number means all.",
+        description="Of each only the last N readings; without any period the last 1000. A very large number means all.",
     )
     sections: list[SectionName] = Field(
         default=[], max_length=len(SectionName), description="Only these sections; all of them where none is named."

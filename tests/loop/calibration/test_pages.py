@@ -100,7 +100,7 @@ class TestWithoutScripts:
         assert "Calibration 1 is stored" in operator.send(place(shop), **GAUGE | {"do": "x" * 5000})
 
     def test_a_calibration_is_typed_in_and_accepted(self, shop: Shop, operator: Person) -> None:
-        assert "Nobody has calibrated this yet" in operator.open(place(shop))
+        assert "Not calibrated yet" in operator.open(place(shop))
         text = operator.send(place(shop), **GAUGE)
         assert "Calibration 1 is stored" in text
         assert "the empirical value becomes +20.0" in text

@@ -170,7 +170,7 @@ class TestPages:
         number, engineer = write(running)["id"], Person(server, "engineer")
         assert "must not be empty" in engineer.send(f"/notes/{number}/withdraw", 422, reason=" ").lower()
         assert "Wrong shaft" in engineer.send(f"/notes/{number}/withdraw", reason="Wrong shaft")
-        assert "Already withdrawn by somebody else" in engineer.send(f"/notes/{number}/withdraw", reason="Again")
+        assert "Already withdrawn by another user" in engineer.send(f"/notes/{number}/withdraw", reason="Again")
 
     def test_at_the_station(self, running: Shop, server: Server, page: Page) -> None:
         Person(server, "operator").sign_in(page)

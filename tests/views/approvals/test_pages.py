@@ -88,7 +88,7 @@ class TestQueue:
         viewer = Person(server, "viewer")
         viewer.open(path, 403)
         viewer.send(path, 403, numbers=str(first), reason="x")
-        assert "You may look" in viewer.open("/corrections")
+        assert "View only" in viewer.open("/corrections")
         assert shop.correction(first)["status"] == "awaiting_approval"
 
     def test_the_number_in_the_navigation(self, shop: Shop, operator: Person) -> None:

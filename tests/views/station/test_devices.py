@@ -299,7 +299,7 @@ class TestSecrets:
     def test_a_badge_is_of_one_person(self, server: Server, admin: Person, milica: Person, tablet: Tablet) -> None:
         other = Person(server, "operator")
         number = _number(server, other)
-        assert "bound to somebody already" in admin.send("/setup/stations/badges", 409, person=number, code=BADGE)
+        assert "bound to a user already" in admin.send("/setup/stations/badges", 409, person=number, code=BADGE)
         assert "Must have" in admin.send("/setup/stations/badges", 422, person=number, code="12")
         admin.send("/setup/stations/badges", person=number, code="7700112233")
         assert "are removed" in admin.send(f"/setup/stations/badges/{number}/remove")

@@ -85,7 +85,7 @@ class TestWithoutScripts:
         alarm = shop.alarms()[0]["id"]
         shop.acknowledge(alarm, "noted")
         here = f"/station/{shop.machine}/alarms/{alarm}"
-        assert "Already acknowledged by somebody else" in operator.send(here, action="tool_replaced", comment="New")
+        assert "Already acknowledged by another user" in operator.send(here, action="tool_replaced", comment="New")
         assert "Already acknowledged by somebody else" in operator.open(f"{here}?action=noted")
 
     def test_what_is_missing_is_asked_again(self, shop: Shop, operator: Person) -> None:
@@ -110,7 +110,7 @@ class TestWithoutScripts:
         alarm = shop.alarms()[0]["id"]
         here = f"/station/{shop.machine}"
         text = viewer.open(here)
-        assert "Acknowledging needs the role operator" in text
+        assert "Acknowledging an alarm requires the Operator role" in text
         assert "data-confirm" not in text
         viewer.open(f"{here}/alarms/{alarm}?action=noted", 403)
         viewer.send(f"{here}/alarms/{alarm}", 403, action="noted", comment="Seen")

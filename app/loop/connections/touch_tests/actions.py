@@ -91,7 +91,7 @@ def answer(session: Session, machine: str, number: int, given: TouchTestAnswer, 
             _("This question of touch test {number} is not open: {state}.").format(
                 number=number, state=wording.explained(test.state)
             ),
-            _("Look at the test as it is now."),
+            _("Check the present state of the test."),
         )
     test.refused = None if given.yes else given.question
     test.answered_by = caller.name

@@ -97,7 +97,7 @@ def history_of(
             _("These are {count} readings; at most {most} can be worked on at once.").format(
                 count=window.count, most=MOST_AT_ONCE
             ),
-            _("Choose a shorter period, or the last so many readings."),
+            _("Choose a shorter period, or fewer readings."),
         )
     names = [name for name in dict.fromkeys(["sequence", *columns]) if name != "sequence" or window.timed]
     if window.timed:

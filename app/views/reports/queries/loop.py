@@ -164,7 +164,7 @@ def _data(chart: WearChart) -> Table:
         Column("reading", _("Reading")),
         Column("worn", _("Wear")),
         Column("taken", _("Taken out by corrections")),
-        Column("readings", _("Mean of so many")),
+        Column("readings", _("Readings per mean")),
     )
     return Table(
         columns,
