@@ -86,7 +86,7 @@ class TestWithoutScripts:
         shop.acknowledge(alarm, "noted")
         here = f"/station/{shop.machine}/alarms/{alarm}"
         assert "Already acknowledged by another user" in operator.send(here, action="tool_replaced", comment="New")
-        assert "Already acknowledged by somebody else" in operator.open(f"{here}?action=noted")
+        assert "Already acknowledged by another user" in operator.open(f"{here}?action=noted")
 
     def test_what_is_missing_is_asked_again(self, shop: Shop, operator: Person) -> None:
         shop.read(12.0)
