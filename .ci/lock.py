@@ -14,7 +14,7 @@ HEAD = """\
 # The exact versions that everything is tested with, and the hashes of their files. Written by `make lock`.
 # `make wheel` writes the part that an installation needs: dist/libraries.txt, for pip install --require-hashes -r
 """
-EXTRAS = ["pyproject.toml", *(f"--extra={each}" for each in ("opcua", "heidenhain", "mqtt", "serial"))]
+EXTRAS = ["pyproject.toml", *(f"--extra={each}" for each in ("opcua", "heidenhain", "mqtt", "serial", "notify"))]
 # What each section is for, and what it holds beyond those before it. `make` and the Dockerfile know the headings.
 SECTIONS = {
     "# For the server": ["pyproject.toml"],

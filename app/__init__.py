@@ -35,6 +35,7 @@ only through each other's queries and actions. frontend/ and migrations/ lie bes
         geometric_form   form and position: roundness, flatness, position, with uncertainty
         rotary_axes      preset compensation of rotary axes, drift, back-ups of the kinematics
     loop             the compensation loop
+        notifications    who is notified of which alarm, by mail, webhook or apprise; deliveries on record
         summaries        counts, standard deviations, charts of ten million points
         calibration      empirical values: against a gauge, in a ring, by pairs; calibrations that are due
         faults           faults that a machine reports about itself and its probe

@@ -54,6 +54,8 @@ from app.loop.machines import keys_api as machine_keys
 from app.loop.machines.keys import caller_of_key
 from app.loop.notes import api as notes
 from app.loop.notes import pages as note_pages
+from app.loop.notifications import api as notifications
+from app.loop.notifications.notifier import Notifier
 from app.loop.programs import api as programs
 from app.loop.readings import api as readings
 from app.loop.readings import aqdef_api, results_actions, table_api
@@ -173,6 +175,7 @@ ROUTERS: tuple[APIRouter, ...] = (
     text_api.router,
     alarms.router,
     notes.router,
+    notifications.router,
     events_api.router,
     people.router,
     machine_keys.router,
@@ -336,7 +339,7 @@ def create_plant(settings: Settings, prefix: str = "") -> Application:
     replica = _replica(settings, database, waits.labels("replica").observe)
     keys, directory = KeyRing(doors, caller_of_key), Directory(doors)
     writer, live, jobs = Writer(database), Live(connections, still_granted), JobRunner(background, jobs_of(settings))
-    report_worker = ReportWorker(background, replica)
+    report_worker, notifier = ReportWorker(background, replica), Notifier(background, settings)
 
     @asynccontextmanager
     async def lifespan(_app: FastAPI) -> AsyncIterator[None]:
@@ -347,10 +350,12 @@ def create_plant(settings: Settings, prefix: str = "") -> Application:
         live.start()
         jobs.start()
         report_worker.start()
+        notifier.start()
         yield
         await live.stop()
         await jobs.stop()
         await report_worker.stop()
+        await notifier.stop()
         await writer.stop()
         if replica is not None:
             replica.stop()

@@ -1,7 +1,9 @@
 """Settings of an installation. Every field is also an environment variable: ``port`` is ``INBAND_PORT``."""
 
 import re
-from ipaddress import ip_address
+from collections.abc import Callable
+from datetime import date
+from ipaddress import ip_address, ip_network
 from pathlib import Path
 from typing import Annotated, Literal, Self
 from urllib.parse import urlsplit
@@ -89,6 +91,25 @@ def _shifts(text: str) -> str:
             f"{text!r} is no list of times; name when the shifts begin, in order, such as 06:00,14:00,22:00"
         )
     return ",".join(begins)
+
+
+def _each(text: str, kind: Callable[[str], object], wrong: str) -> str:
+    """The parts of a list, each of this kind, with commas between them."""
+    parts = [each.strip() for each in text.split(",") if each.strip()]
+    for part in parts:
+        try:
+            kind(part)
+        except ValueError:
+            raise ValueError(f"{part!r} is no {wrong}") from None
+    return ",".join(parts)
+
+
+def _networks(text: str) -> str:
+    return _each(text, ip_network, "network; name it like 192.168.10.0/24")
+
+
+def _dates(text: str) -> str:
+    return _each(text, date.fromisoformat, "date; write it like 2026-12-24")
 
 
 TAKEN_SCHEMAS = frozenset({"inband", "information_schema"})
@@ -221,6 +242,35 @@ class Settings(BaseSettings):
         ge=2,
         le=1000,
         description="Corrections of one characteristic that a machine may leave behind before that alarm, for five minutes.",
+    )
+
+    mail_server: Annotated[str, Field(pattern=r"^[A-Za-z0-9.-]+(:[0-9]{1,5})?$")] | None = Field(
+        default=None,
+        description="Mail server for notifications, such as mail.example:587. Without it no mail is sent.",
+    )
+    mail_security: Literal["starttls", "tls", "none"] = Field(
+        default="starttls",
+        description="Encryption to the mail server: starttls, tls from the first byte, or none, for one on this computer.",
+    )
+    mail_user: str | None = Field(
+        default=None, description="User at the mail server; without it nobody signs in there."
+    )
+    mail_password: str | None = Field(default=None, repr=False, description="Its password.")
+    mail_from: Annotated[str, Field(pattern=r"^[^@\s<>]+@[^@\s<>]+$")] | None = Field(
+        default=None, description="Sender of the mails; inband@ and the name of the mail server if left out."
+    )
+    webhook_networks: Annotated[str, AfterValidator(_networks)] = Field(
+        default="",
+        description="Networks inside which webhooks may lead, such as 192.168.10.0/24, comma-separated. Without it they lead to "
+        "public addresses only, by https.",
+    )
+    allow_apprise: bool = Field(
+        default=False,
+        description="Let administrators send notifications by apprise, which connects to any address, inside the network too.",
+    )
+    days_off: Annotated[str, AfterValidator(_dates)] = Field(
+        default="",
+        description="Days on which the plant does not work, such as 2026-12-24,2026-12-31: for notifications.",
     )
 
     log_level: Literal["debug", "info", "warning", "error"] = Field(

@@ -36,7 +36,7 @@ def test_each_section_holds_what_it_is_for() -> None:
     so_far: set[str] = set()
     for heading, wanted in {
         "For the server": project["dependencies"],
-        "For extras": [*extras["opcua"], *extras["heidenhain"], *extras["mqtt"], *extras["serial"]],
+        "For extras": [each for name in ("opcua", "heidenhain", "mqtt", "serial", "notify") for each in extras[name]],
         "For building": ["hatchling", "editables"],
         "For tests": extras["dev"],
         "For make lock and make audit": extras["tools"],

@@ -85,6 +85,10 @@ def known_place(session: Session, person_id: int, place: str) -> bool:
     return session.scalar(known) is not None
 
 
+WITHOUT_ACCESS = select(Person.id).where(Person.disabled_at.is_not(None))
+"""The people whose access has ended."""
+
+
 def person(session: Session, person_id: int) -> Person | None:
     return session.get(Person, person_id)
 

@@ -67,6 +67,10 @@ ADDED_TABLES = {
     "connection",
     "touch_test",
     "import_mapping",
+    "receiver",
+    "notification_route",
+    "announced",
+    "delivery",
 }
 
 

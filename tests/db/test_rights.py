@@ -23,11 +23,13 @@ GRANT USAGE ON ALL SEQUENCES IN SCHEMA public TO {ROLE};
 """
 # Rows that move on or go away by themselves: notes made anew, plans, sessions, reports of a week, the journal of events.
 PASSING = {
+    "announced",
     "badge",
     "browser_session",
     "calibration_plan",
     "capability_verdict",
     "connection",
+    "delivery",
     "event",
     "fixture",
     "import_mapping",
@@ -37,7 +39,9 @@ PASSING = {
     "kinematics_plan",
     "known_place",
     "login_failure",
+    "notification_route",
     "outlook",
+    "receiver",
     "report_file",
     "report_job",
     "report_part",

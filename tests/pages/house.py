@@ -9,6 +9,7 @@ from tests.geometry.geometric_form.test_forms import BORE
 from tests.geometry.rotary_axes.bench import axis
 from tests.quality.control_charts.line import Line
 from tests.shop import Shop
+from tests.waits import until
 
 # By the address of the route: how it is opened, as a function of the shop.
 PAGES = {
@@ -149,6 +150,10 @@ PAGES = {
     "/kinematics": ["/kinematics"],
     "/kinematics/measuring-plan": ["/kinematics/measuring-plan"],
     "/setup/jobs": ["/setup/jobs"],
+    "/setup/notifications": ["/setup/notifications"],
+    "/setup/notifications/routes/new": ["/setup/notifications/routes/new"],
+    "/setup/notifications/routes/{route}": ["/setup/notifications/routes/{route}"],
+    "/account/notifications": ["/account/notifications"],
     "/kinematics/new": [
         "/kinematics/new",
         "/kinematics/new?way=positions",
@@ -311,7 +316,25 @@ def furnished(server: Server) -> Shop:
         "POST", "/notes", 201, machine=made.machine, text="Coolant changed\n" + "Kühlschmierstoffkonzentration" * 4
     )
     made.call("POST", "/notes", 201, characteristic=made.characteristic, sequence=3, text="New batch of bars")
+    _notified(made)
     return made
+
+
+def _notified(made: Shop) -> None:
+    """A receiver, a route that is off, and a delivery that has failed."""
+    receiver: dict[str, Any] = {
+        "name": "Shift leader of the hall with the long name",
+        "means": "mail",
+        "address": "shift.leader@a-plant-with-a-long-name.example",
+        "quiet": [{"days": [6, 7], "begins": "22:00", "ends": "06:00"}],
+    }
+    number = made.call("POST", "/notifications/receivers", 201, **receiver)["id"]
+    hours = [{"days": [1, 2, 3, 4, 5], "begins": "06:00", "ends": "14:00"}]
+    steps = [{"receivers": [number]}, {"after": 15, "receivers": [number]}]
+    route: dict[str, Any] = {"kinds": ["tool_worn", "probe_fault"], "hours": hours, "steps": steps, "enabled": False}
+    made.call("POST", "/notifications/routes", 201, name="Worn tools, early shift", **route)
+    test = made.call("POST", f"/notifications/receivers/{number}/test", 202)["id"]
+    until(lambda: made.call("GET", f"/notifications/deliveries/{test}")["state"] == "failed")
 
 
 def values_of(shop: Shop) -> dict[str, Any]:
@@ -340,4 +363,5 @@ def values_of(shop: Shop) -> dict[str, Any]:
         "alignment": of("alignments")[0]["id"],
         "form": of("forms")[0]["id"],
         "run": of("kinematics/runs")[-1]["run"],
+        "route": shop.call("GET", "/notifications/routes")["items"][-1]["id"],
     }

@@ -23,6 +23,7 @@ from tests.in_process import in_process
 from tests.loop.readings.record import counted
 from tests.quality.control_charts.line import Line
 from tests.shop import PARAMETERS, Shop
+from tests.waits import until
 
 pytestmark = pytest.mark.own_server  # rows of all tables are counted
 
@@ -65,7 +66,39 @@ GAUGE: dict[str, Any] = {
     "unbalanced": "refuse",
     "rows": [{"part": part, "operator": "A", "values": [40.0, 40.001]} for part in ("1", "2")],
 }
+NIGHT = {"days": [1, 2, 3, 4, 5], "begins": "22:00", "ends": "06:00"}
+ROUTE: dict[str, Any] = {
+    "name": "Night",
+    "enabled": False,
+    "kinds": ["tool_worn"],
+    "tones": ["stop"],
+    "machines": ["{machine}"],
+    "characteristics": ["{characteristic}"],
+    "hours": [NIGHT],
+    "on_days_off": False,
+    "urgent": True,
+    "repeat": 10,
+    "digest": 5,
+    "hold_off": 5,
+    "steps": [{"after": 0, "receivers": [1]}],
+}
+RECEIVER: dict[str, Any] = {
+    "name": "Andon",
+    "address": "https://andon.example/inband",
+    "quiet": [NIGHT],
+    "away_until": "2026-11-21T08:15:02Z",
+    "events": ["tool"],
+}
 BODIES: dict[str, dict[str, Any]] = {
+    "POST /api/v1/notifications/routes": ROUTE,
+    "PUT /api/v1/notifications/routes/{route}": ROUTE,
+    "POST /api/v1/notifications/receivers": RECEIVER | {"means": "webhook"},
+    "PATCH /api/v1/notifications/receivers/{receiver}": RECEIVER,
+    "PUT /api/v1/notifications/me": {
+        "address": "anna@example.com",
+        "quiet": [NIGHT],
+        "away_until": "2026-11-21T08:15:02Z",
+    },
     "POST /api/v1/readings/aqdef": {"name": "bad.dfq", "content": AQDEF},
     "POST /api/v1/readings/table": {
         "name": "bad.csv",
@@ -493,6 +526,9 @@ class Place:
             "pair": pairs[0]["id"],
             "note": shop.call("POST", "/notes", 201, machine=shop.machine, text="New bar")["id"],
             "proposal": proposal["id"],
+            "receiver": self.notified(shop),
+            "route": 1,
+            "delivery": 1,
             "form": "csv",
             "person": next(person[name] for name in ("id", "name", "key") if name in person),
             "key": shop.call("POST", f"/machines/{shop.machine}/keys", 201, name="second")["id"],
@@ -540,6 +576,17 @@ class Place:
         of_form = ("/api/v1/forms/{number}", "/api/v1/forms/{number}/figure", "/api/v1/forms/{number}/recompute")
         self.numbers |= dict.fromkeys(of_form, form["id"])
         self.numbers |= {f"/api/v1/reports/{{number}}{what}": reports for what in of_reports}
+
+    @staticmethod
+    def notified(shop: Shop) -> Any:
+        """A receiver with a route that is off, and a delivery; in a database of their own they are each the first."""
+        sent: dict[str, Any] = {"name": "Anna", "means": "mail", "address": "anna@example.com"}
+        number = shop.call("POST", "/notifications/receivers", 201, **sent)["id"]
+        steps = [{"receivers": [number]}]
+        shop.call("POST", "/notifications/routes", 201, name="Off", enabled=False, steps=steps)
+        test = shop.call("POST", f"/notifications/receivers/{number}/test", 202)["id"]
+        until(lambda: shop.call("GET", f"/notifications/deliveries/{test}")["state"] == "failed")
+        return number
 
     def beat(self) -> None:
         """Let the bridges tell that they live."""

@@ -1,6 +1,7 @@
 """``inband demo``: the server with the demonstration plant beside it."""
 
 import logging
+import os
 import threading
 from typing import TYPE_CHECKING, Annotated
 
@@ -49,6 +50,7 @@ def demo(
     """Run the server with a simulated plant: three lathes and a milling machine that call its public API."""
     from app.cli.demo import people
 
+    os.environ.setdefault("INBAND_WEBHOOK_NETWORKS", "127.0.0.1/32")  # its andon listens on this computer
     settings = settings_from(
         host=host, port=port, data_dir=data_dir, database_url=database_url, log_level=log_level, log_format=log_format
     )

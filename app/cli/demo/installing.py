@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from datetime import UTC, datetime
 from random import Random
 
-from app.cli.demo import calibrating, plant, touching, turning
+from app.cli.demo import andon, calibrating, plant, touching, turning
 from app.cli.demo.running import Line, Pace
 from app.cli.demo.simulation import Machine
 from inband_client import Client, NotFound
@@ -70,6 +70,7 @@ def lines(
         gateway = client(new_key(admin, f"/machines/{spec.key}/keys", {"name": KEY_NAME}))
         rng = Random(f"{seed}:{spec.key}:operator")
         simulated.append(Line(Machine(spec, seed), gateway, operator, run, rng, ending))
+    andon.start(admin)
     admin.close()
     return simulated
 

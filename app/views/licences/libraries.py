@@ -8,7 +8,7 @@ from importlib.metadata import Distribution, PackageNotFoundError, PackagePath, 
 from pathlib import Path
 from typing import Any, NamedTuple
 
-EXTRAS = ("opcua", "heidenhain", "mqtt", "serial")
+EXTRAS = ("opcua", "heidenhain", "mqtt", "serial", "notify")
 """Of Inband, counted where they are installed; what develops Inband is no part of it."""
 LONGEST_NAME = 60
 """Letters: some distributions write the whole text where the name of the licence belongs."""

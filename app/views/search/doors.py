@@ -54,6 +54,7 @@ def doors() -> list[Door]:
         Door(_("Program text"), "/setup/programs", _("read a program, Sinumerik, Fanuc, Heidenhain")),
         Door(_("People"), "/setup/people", _("invite, role, user, password"), "admin"),
         Door(_("Record of changes"), "/setup/audit", _("audit trail, who changed what"), "engineer"),
+        Door(_("Notifications"), "/setup/notifications", _("mail, webhook, escalation, quiet hours, on call"), "admin"),
         Door(_("Background jobs"), "/setup/jobs", _("periodic jobs, failing"), "engineer"),
         Door(_("Proof"), "/proof", _("published examples, validation")),
         Door(_("Licences"), "/licences", _("libraries, versions, SBOM, open source")),

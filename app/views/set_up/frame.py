@@ -21,6 +21,7 @@ def setup_page(
     if caller.may("admin"):
         tabs.append(("people", _("People"), "/setup/people"))
         tabs.append(("stations", _("Stations"), "/setup/stations"))
+        tabs.append(("notifications", _("Notifications"), "/setup/notifications"))
     if caller.may("engineer"):
         tabs.append(("audit", _("Record of changes"), "/setup/audit"))
         tabs.append(("jobs", _("Background jobs"), "/setup/jobs"))
@@ -40,6 +41,8 @@ def done(code: str) -> str | None:
     """The sentence for what the page before did."""
     return {
         "added": _("Added."),
+        "deleted": _("Deleted."),
+        "test-sent": _("A test is sent within seconds; below, the delivery says how it ended."),
         "changed": _("Saved."),
         "same": _("Nothing was different; nothing was changed."),
         "revoked": _("The key is revoked. It stops working within a second."),

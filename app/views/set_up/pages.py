@@ -10,6 +10,7 @@ from app.views.set_up import (
     job_pages,
     machine_pages,
     many_pages,
+    notification_pages,
     people_pages,
     program_pages,
     station_pages,
@@ -30,6 +31,7 @@ for part in (
     program_pages,
     people_pages,
     station_pages,
+    notification_pages,
     audit_pages,
     job_pages,
 ):

@@ -1,0 +1,50 @@
+"""The andon of the demonstration plant: a webhook on this computer that writes down what it gets, so that notifications show."""
+
+import json
+import logging
+import threading
+from http.server import BaseHTTPRequestHandler, HTTPServer
+from typing import Any
+
+from inband_client import Client
+
+log = logging.getLogger(__name__)
+
+NAME = "Andon of the demonstration"
+LONGEST = 1_000_000  # bytes of a message
+
+
+class _Andon(BaseHTTPRequestHandler):
+    timeout = 10
+
+    def do_POST(self) -> None:
+        length = min(int(self.headers.get("Content-Length") or 0), LONGEST)
+        try:
+            subject = json.loads(self.rfile.read(length)).get("subject", "")
+        except (ValueError, AttributeError):
+            subject = "?"
+        log.info("andon: %s", subject)
+        self.send_response(204)
+        self.end_headers()
+
+    def log_message(self, format: str, *args: Any) -> None:  # noqa: A002 - the name that is overridden
+        """Say nothing of each request."""
+
+
+def start(admin: Client) -> None:
+    """Listen, and let Inband notify it of what stops a machine or wears a tool."""
+    server = HTTPServer(("127.0.0.1", 0), _Andon)
+    threading.Thread(target=server.serve_forever, name="demo andon", daemon=True).start()
+    address = f"http://127.0.0.1:{server.server_port}/"
+    known = next((each for each in admin.items("/notifications/receivers") if each["name"] == NAME), None)
+    if known is not None:  # of an earlier run, which had another port
+        admin.call("PATCH", f"/notifications/receivers/{known['id']}", json={"address": address})
+        return
+    receiver = {"name": NAME, "means": "webhook", "address": address, "events": ["tool"]}
+    number = admin.post("/notifications/receivers", receiver)["id"]
+    steps = [{"after": 0, "receivers": [number]}]
+    for name, more in (
+        ("Stopped or worn", {"tones": ["stop", "wear"], "repeat": 30, "urgent": True}),
+        ("Everything else, every hour", {"tones": ["attention", "waiting"], "digest": 60}),
+    ):
+        admin.post("/notifications/routes", {"name": name, "steps": steps, **more})

@@ -1,0 +1,215 @@
+"""Notifications of active alarms, to whom and when: routes, quiet hours, repetition, escalation, one message in place of a flood.
+
+A route names the alarms it is for and steps of receivers. A step begins so many minutes after the alarm, or at once where
+nobody of the steps before it can be reached. A receiver gets at most one message in `GAP`, with everything that is due then.
+"""
+
+from collections import defaultdict
+from collections.abc import Container, Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+from datetime import date, datetime, time, timedelta, tzinfo
+from typing import NamedTuple
+
+GAP = timedelta(minutes=1)
+"""Least time between two messages to one receiver, however many alarms come."""
+FIRST_PAUSE, LONGEST_PAUSE = timedelta(seconds=10), timedelta(minutes=10)
+"""Before a receiver that could not be reached is tried again: twice the pause before, up to the longest."""
+NEVER = timedelta(0)
+DAY = timedelta(days=1)
+
+
+@dataclass(frozen=True, slots=True)
+class Hours:
+    """A part of the week: on these days (1 Monday to 7 Sunday) from `begins` until before `ends`.
+
+    One that ends where it begins, or earlier, ends on the next day.
+    """
+
+    days: frozenset[int]
+    begins: time
+    ends: time
+
+    def hold(self, local: datetime, days_off: Container[date] = ()) -> bool:
+        """Tell if a moment of the plant's clock lies in it. days_off: on them it does not begin."""
+        begun = [local.date()] if self.begins <= local.time() else []
+        if self.ends <= self.begins:
+            if local.time() < self.ends:
+                begun.append(local.date() - DAY)
+        elif local.time() >= self.ends:
+            begun.clear()
+        return any(day.isoweekday() in self.days and day not in days_off for day in begun)
+
+
+@dataclass(frozen=True, slots=True)
+class Step:
+    """Receivers, by number, that are notified of an alarm that is still active after this time."""
+
+    after: timedelta
+    receivers: tuple[int, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Raised:
+    """An active alarm. tone: its urgency, as `app.web.states` has it."""
+
+    id: int
+    kind: str
+    tone: str
+    machine: str
+    characteristic: str | None
+    tool: int | None
+    at: datetime
+
+    @property
+    def cause(self) -> tuple[str, str, str | None, int | None]:
+        """The same for the same trouble, raised again."""
+        return self.kind, self.machine, self.characteristic, self.tool
+
+
+@dataclass(frozen=True, slots=True)
+class Route:
+    """The alarms that go to some receivers, and when.
+
+    kinds, tones, machines, characteristics: the alarms, all where empty. hours: when it is open; always where empty.
+    on_days_off: its hours begin on days off too. urgent: through the quiet hours of receivers. repeat: until acknowledged, 0
+    not at all. digest: a first message waits so long for others. hold_off: the same trouble raised again within it is not
+    announced before it ends.
+    """
+
+    steps: tuple[Step, ...]
+    kinds: frozenset[str] = frozenset()
+    tones: frozenset[str] = frozenset()
+    machines: frozenset[str] = frozenset()
+    characteristics: frozenset[str] = frozenset()
+    hours: tuple[Hours, ...] = ()
+    on_days_off: bool = True
+    urgent: bool = False
+    repeat: timedelta = NEVER
+    digest: timedelta = NEVER
+    hold_off: timedelta = NEVER
+
+    def concerns(self, alarm: Raised) -> bool:
+        """Tell if it is for this alarm."""
+        return (
+            (not self.kinds or alarm.kind in self.kinds)
+            and (not self.tones or alarm.tone in self.tones)
+            and (not self.machines or alarm.machine in self.machines)
+            and (not self.characteristics or alarm.characteristic in self.characteristics)
+        )
+
+    def is_open(self, local: datetime, days_off: Container[date]) -> bool:
+        """Tell if it is open at this moment of the plant's clock."""
+        off = () if self.on_days_off else days_off
+        if not self.hours:
+            return local.date() not in off
+        return any(hours.hold(local, off) for hours in self.hours)
+
+
+@dataclass(frozen=True, slots=True)
+class Receiver:
+    """Somebody, or something, that is notified. quiet: when not; away_until: not before; last_at: its last message.
+
+    failing: it could not be reached the last time. busy: it must not be tried now, for it is being tried or pauses.
+    """
+
+    id: int
+    quiet: tuple[Hours, ...] = ()
+    away_until: datetime | None = None
+    last_at: datetime | None = None
+    failing: bool = False
+    busy: bool = False
+
+    def listens(self, now: datetime, local: datetime, *, urgent: bool) -> bool:
+        """Tell if it takes a message now."""
+        if self.away_until is not None and now < self.away_until:
+            return False
+        return urgent or not any(hours.hold(local) for hours in self.quiet)
+
+
+@dataclass(frozen=True, slots=True)
+class Record:
+    """The last notifications of receivers: of alarms by number, and of causes, both with the receiver's number."""
+
+    alarms: Mapping[tuple[int, int], datetime] = field(default_factory=dict)
+    causes: Mapping[tuple[tuple[str, str, str | None, int | None], int], datetime] = field(default_factory=dict)
+
+
+class Notice(NamedTuple):
+    """One message to be sent now: to whom, the alarms in it, oldest first, and those of them of which it is a reminder."""
+
+    receiver: int
+    alarms: tuple[int, ...]
+    again: frozenset[int]
+
+
+def notices(
+    routes: Iterable[Route],
+    receivers: Mapping[int, Receiver],
+    alarms: Sequence[Raised],
+    record: Record,
+    now: datetime,
+    zone: tzinfo,
+    days_off: Container[date] = (),
+) -> list[Notice]:
+    """Messages that are due now, at most one for each receiver.
+
+    alarms: the active ones. zone: of the plant, by whose clock hours are meant.
+    """
+    local = now.astimezone(zone)
+    due: dict[int, dict[int, bool]] = defaultdict(
+        dict
+    )  # by receiver and alarm: whether a message has to leave for it now
+    for route in routes:
+        if not route.is_open(local, days_off):
+            continue
+        for alarm in filter(route.concerns, alarms):
+            for number, begun in _begun(route, receivers, alarm, now).items():
+                receiver = receivers[number]
+                at = _due_at(route, receiver, alarm, begun, record)
+                if at is not None and at <= now and receiver.listens(now, local, urgent=route.urgent):
+                    leaves = (alarm.id, number) in record.alarms or at + route.digest <= now
+                    due[number][alarm.id] = due[number].get(alarm.id, False) or leaves
+    return [
+        Notice(number, tuple(sorted(of)), frozenset(each for each in of if (each, number) in record.alarms))
+        for number, of in sorted(due.items())
+        if any(of.values()) and _may_have_one(receivers[number], now)
+    ]
+
+
+def _begun(route: Route, receivers: Mapping[int, Receiver], alarm: Raised, now: datetime) -> dict[int, datetime]:
+    """The receivers of the steps that have begun, and since when; a step after such as cannot be reached begins at once."""
+    begun: dict[int, datetime] = {}
+    unreached = False
+    for step in route.steps:
+        since = alarm.at + step.after
+        if since > now:
+            if not unreached:
+                break
+            since = now
+        known = [number for number in step.receivers if number in receivers]
+        for number in known:
+            begun.setdefault(number, since)
+        unreached = all(receivers[number].failing for number in known)
+    return begun
+
+
+def _due_at(route: Route, receiver: Receiver, alarm: Raised, begun: datetime, record: Record) -> datetime | None:
+    """The moment to notify this receiver of this alarm; None: it was notified, and is not reminded."""
+    last = record.alarms.get((alarm.id, receiver.id))
+    if last is not None:
+        return last + route.repeat if route.repeat else None
+    before = record.causes.get((alarm.cause, receiver.id))
+    return begun if before is None else max(begun, before + route.hold_off)
+
+
+def _may_have_one(receiver: Receiver, now: datetime) -> bool:
+    return not receiver.busy and (receiver.last_at is None or receiver.last_at + GAP <= now)
+
+
+def pause_after(failures: int) -> timedelta:
+    """Time before the next try after so many failures in a row, at least one.
+
+    >>> [pause_after(failures).total_seconds() for failures in (1, 2, 3, 99)]
+    [10.0, 20.0, 40.0, 600.0]
+    """
+    return min(FIRST_PAUSE * float(1 << min(failures - 1, 30)), LONGEST_PAUSE)

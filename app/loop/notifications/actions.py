@@ -1,0 +1,232 @@
+"""Setting up routes and receivers. Addresses and secrets never stand in the record of changes."""
+
+import secrets
+from collections.abc import Container, Iterable
+from datetime import UTC, datetime
+from typing import Any
+
+from sqlalchemy import func, select
+from sqlalchemy.orm import Session
+
+from app.access import queries as people
+from app.access.audit.actions import record
+from app.access.callers import Caller
+from app.db.events import publish
+from app.db.tables import Event
+from app.errors import Conflict, FieldError, Invalid, NotAllowed, NotFound
+from app.language.i18n import _
+from app.loop.alarms.kinds import kinds
+from app.loop.notifications import queries
+from app.loop.notifications.addresses import Refused, check
+from app.loop.notifications.schemas import OwnAddressIn, ReceiverChange, ReceiverIn, RouteIn
+from app.loop.notifications.tables import Delivery, NotificationRoute, Receiver
+from app.loop.tables.characteristics import Characteristic
+from app.loop.tables.machines import Machine
+from app.settings import Settings
+
+MOST_ROUTES, MOST_RECEIVERS = 200, 500
+_CHANGED = {"kind": "notifications"}
+
+
+def add_route(session: Session, given: RouteIn, caller: Caller) -> NotificationRoute:
+    """Add a route. Raises `Invalid` for names that nothing has, `Conflict` where there are `MOST_ROUTES`."""
+    _check_route(session, given)
+    if len(queries.routes(session)) >= MOST_ROUTES:
+        raise Conflict(_("There are {n} routes already.").format(n=MOST_ROUTES), _("Delete one first."))
+    row = NotificationRoute(name=given.name, enabled=given.enabled, rule=_rule(given), created_by=caller.name)
+    session.add(row)
+    session.flush()
+    record(session, caller.name, "route added", f"notification-route/{row.id}", None, given.model_dump(mode="json"))
+    publish(session, _CHANGED)
+    return row
+
+
+def change_route(session: Session, number: int, given: RouteIn, caller: Caller) -> NotificationRoute:
+    """Replace a route. Raises `NotFound`, and `Invalid` as `add_route`."""
+    row = queries.route(session, number, hold=True)
+    _check_route(session, given)
+    before = {"name": row.name, "enabled": row.enabled, **row.rule}
+    row.name, row.enabled, row.rule = given.name, given.enabled, _rule(given)
+    after = given.model_dump(mode="json")
+    if before != after:
+        record(session, caller.name, "route changed", f"notification-route/{number}", before, after)
+        publish(session, _CHANGED)
+    return row
+
+
+def delete_route(session: Session, number: int, caller: Caller) -> None:
+    """Delete a route. Raises `NotFound`."""
+    row = queries.route(session, number, hold=True)
+    before = {"name": row.name, "enabled": row.enabled, **row.rule}
+    session.delete(row)
+    record(session, caller.name, "route deleted", f"notification-route/{number}", before, None)
+    publish(session, _CHANGED)
+
+
+def _rule(given: RouteIn) -> dict[str, Any]:
+    return given.model_dump(mode="json", exclude={"name", "enabled"})
+
+
+def _check_route(session: Session, given: RouteIn) -> None:
+    """Refuse names that nothing has: such a route would wait for ever."""
+    errors = _unknown("kinds", given.kinds, {kind.name for kind in kinds()}, _("there is no kind of alarm {name}"))
+    for field, named, key, words in (
+        ("machines", given.machines, Machine.key, _("there is no machine {name}")),
+        ("characteristics", given.characteristics, Characteristic.key, _("there is no characteristic {name}")),
+    ):
+        known = set(session.scalars(select(key).where(key.in_(named)))) if named else set[str]()
+        errors += _unknown(field, named, known, words)
+    there = {row.id for row in queries.receivers(session)}
+    errors += _unknown("steps", sorted(queries.receivers_of(_rule(given))), there, _("there is no receiver {name}"))
+    if errors:
+        raise Invalid(f"{errors[0].field}: {errors[0].message}.", errors=errors)
+
+
+def _unknown(field: str, named: Iterable[str | int], known: Container[Any], words: str) -> list[FieldError]:
+    return [FieldError(field, words.format(name=repr(each))) for each in named if each not in known]
+
+
+# --- receivers
+
+
+def add_receiver(session: Session, given: ReceiverIn, caller: Caller, settings: Settings) -> Receiver:
+    """Add a receiver; a webhook gets a secret. Raises `Invalid` for an address that is not permitted, `Conflict`."""
+    _permitted(given.means, given.address, settings)
+    if len(queries.receivers(session)) >= MOST_RECEIVERS:
+        raise Conflict(_("There are {n} receivers already.").format(n=MOST_RECEIVERS), _("Delete one first."))
+    return _added(session, caller, Receiver(**given.model_dump(mode="json") | {"away_until": given.away_until}))
+
+
+def _added(session: Session, caller: Caller, row: Receiver) -> Receiver:
+    row.created_by = caller.name
+    if row.means == "webhook":
+        row.secret = secrets.token_urlsafe(32)
+        row.cursor = _last_event(session)
+    session.add(row)
+    session.flush()
+    session.refresh(row)
+    record(session, caller.name, "receiver added", f"receiver/{row.id}", None, _facts(row))
+    publish(session, _CHANGED)
+    return row
+
+
+def _last_event(session: Session) -> int:
+    return session.scalar(select(func.max(Event.id))) or 0
+
+
+def change_receiver(
+    session: Session, number: int, change: ReceiverChange, caller: Caller, settings: Settings
+) -> Receiver:
+    """Change what is named. Raises `NotFound`; `Invalid` for an address that is not permitted."""
+    row = queries.receiver(session, number, hold=True)
+    before, named = _facts(row), change.model_fields_set
+    if change.address is not None and change.address != row.address:
+        _permitted(row.means, change.address, settings)
+        row.address, row.failures, row.retry_at = change.address, 0, None
+    if change.events and row.means != "webhook":
+        raise Invalid.at("events", _("go to webhooks only"))
+    if change.events is not None:
+        if not row.events:
+            row.cursor = _last_event(session)
+        row.events = list(change.events)
+    if change.name is not None:
+        row.name = change.name
+    if change.quiet is not None:
+        row.quiet = [each.model_dump() for each in change.quiet]
+    if "away_until" in named:
+        row.away_until = change.away_until
+    session.flush()
+    after = _facts(row)
+    if before != after or change.address is not None:
+        record(session, caller.name, "receiver changed", f"receiver/{number}", before, after)
+        publish(session, _CHANGED)
+    return row
+
+
+def delete_receiver(session: Session, number: int, caller: Caller) -> None:
+    """Delete a receiver. Raises `NotFound`; `Conflict` while a route names it."""
+    row = queries.receiver(session, number, hold=True)
+    used = queries.routes_to(session, number)
+    if used:
+        raise Conflict(
+            _("The route “{name}” names this receiver.").format(name=used[0].name),
+            _("Take it out of the route first, or delete the route."),
+        )
+    row.deleted_at = datetime.now(UTC)
+    row.secret = None
+    record(session, caller.name, "receiver deleted", f"receiver/{number}", _facts(row), None)
+    publish(session, _CHANGED)
+
+
+def _permitted(means: str, address: str, settings: Settings) -> None:
+    try:
+        check(means, address, settings)
+    except Refused as error:
+        raise Invalid.at("address", str(error)) from None
+
+
+def _facts(row: Receiver) -> dict[str, Any]:
+    """A receiver in the record of changes; addresses of the web hold secrets of their services."""
+    return {
+        "name": row.name,
+        "means": row.means,
+        "quiet": row.quiet,
+        "away_until": row.away_until.isoformat() if row.away_until else None,
+        "events": row.events,
+    }
+
+
+# --- one's own address
+
+
+def set_own(session: Session, given: OwnAddressIn, caller: Caller, settings: Settings) -> Receiver:
+    """Say where the caller gets mail. Raises `NotAllowed` for a key, which is no person; `Invalid`."""
+    if caller.person_id is None:
+        raise NotAllowed(_("A key has no mail address."), _("Sign in as a person."))
+    people.hold_person(session, {"person": caller.person_id})  # of two at once, one comes second
+    row = queries.own(session, caller.person_id)
+    if row is not None:
+        change = ReceiverChange(address=given.address, quiet=given.quiet, away_until=given.away_until)
+        return change_receiver(session, row.id, change, caller, settings)
+    _permitted("mail", given.address, settings)
+    given_quiet = [each.model_dump() for each in given.quiet]
+    return _added(
+        session,
+        caller,
+        Receiver(
+            name=caller.name,
+            means="mail",
+            address=given.address,
+            person_id=caller.person_id,
+            quiet=given_quiet,
+            away_until=given.away_until,
+        ),
+    )
+
+
+def delete_own(session: Session, caller: Caller) -> None:
+    """Forget where the caller gets mail. Raises `NotFound`, and `Conflict` as `delete_receiver`."""
+    row = queries.own(session, caller.person_id) if caller.person_id is not None else None
+    if row is None:
+        raise NotFound(_("You have given no mail address."), _("There is nothing to delete."))
+    delete_receiver(session, row.id, caller)
+
+
+# --- tests
+
+
+def ask_for_test(session: Session, number: int, caller: Caller) -> Delivery:
+    """Send a test within seconds; one that waits already is answered again. Raises `NotFound`."""
+    queries.receiver(session, number, hold=True)
+    waiting = select(Delivery).where(Delivery.receiver_id == number, Delivery.state == "waiting")
+    row = session.scalars(waiting).first()
+    if row is None:
+        row = Delivery(
+            receiver_id=number, about="test", subject=_("Inband: test"), state="waiting", asked_by=caller.name
+        )
+        session.add(row)
+        session.flush()
+        session.refresh(row)
+        record(session, caller.name, "test sent", f"receiver/{number}")
+        publish(session, {"kind": "delivery", "id": row.id})
+    return row

@@ -1,0 +1,208 @@
+"""Delivering one message: by mail, to a webhook, by apprise. Each ends within `LIMIT`, whatever the other side does."""
+
+import asyncio
+import hashlib
+import hmac
+import secrets
+import smtplib
+import ssl
+import threading
+import time
+from collections.abc import Callable
+from contextlib import suppress
+from contextvars import copy_context
+from dataclasses import dataclass, field
+from email.message import EmailMessage
+from email.utils import formatdate
+from functools import cache
+from typing import Any, NamedTuple, TypeVar
+
+import httpx
+import msgspec
+
+from app import __version__
+from app.language.i18n import _
+from app.loop.notifications.addresses import APPRISE, Place, Refused, place_of
+from app.settings import Settings
+
+LIMIT = 15.0
+"""Seconds for one delivery, of all its steps together."""
+STEP = 10.0
+"""Seconds for one step of it: to connect, or to get the next bytes."""
+LONGEST_ANSWER = 300
+Result = TypeVar("Result")
+
+
+class Answer(NamedTuple):
+    """The end of a delivery: whether it arrived, and what was answered, or why it was not reached."""
+
+    delivered: bool
+    text: str
+
+
+@dataclass(frozen=True, slots=True)
+class Message:
+    """A message as each means needs it. data: the JSON of webhooks."""
+
+    subject: str
+    text: str
+    data: dict[str, Any] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, slots=True)
+class Job:
+    """A delivery to be made. delivery: its number. cursor: the last event in it, of one about changes."""
+
+    delivery: int
+    receiver: int
+    about: str
+    means: str
+    address: str
+    secret: str | None
+    message: Message
+    alarms: tuple[int, ...] = ()
+    cursor: int | None = None
+
+
+async def deliver(job: Job, settings: Settings) -> Answer:
+    """Deliver it, once. Never raises for what the other side does."""
+    try:
+        async with asyncio.timeout(LIMIT):
+            if job.means == "webhook":
+                return await _to_webhook(job, settings)
+            send = _by_mail if job.means == "mail" else _by_apprise
+            return Answer(delivered=True, text=await _in_thread(_MAILS, lambda: send(job, settings)))
+    except TimeoutError:
+        return Answer(delivered=False, text=_("no answer within {n} s").format(n=f"{LIMIT:g}"))
+    except Refused as error:
+        return Answer(delivered=False, text=_short(str(error)))
+    except (OSError, smtplib.SMTPException, httpx.HTTPError, httpx.InvalidURL, ValueError) as error:
+        return Answer(
+            delivered=False, text=_short(f"{type(error).__name__}: {error}" if str(error) else type(error).__name__)
+        )
+
+
+_MAILS, _NAMES = threading.BoundedSemaphore(32), threading.BoundedSemaphore(32)
+"""Threads that wait for mail servers or apprise, and for the name service: of one process, none of those that serve requests."""
+
+
+async def _in_thread(slots: threading.BoundedSemaphore, work: Callable[[], Result]) -> Result:
+    """The result of work in a thread of its own. Nobody waits for one that hangs; while all hang, no more are begun."""
+    if not slots.acquire(blocking=False):
+        raise OSError(_("too many servers that do not answer are being waited for"))
+    loop = asyncio.get_running_loop()
+    result: asyncio.Future[Result] = loop.create_future()
+
+    def settle(set_it: Callable[[Any], None], value: Any) -> None:
+        if not result.done():  # the time was not up yet
+            set_it(value)
+
+    def run() -> None:
+        try:
+            ended: tuple[Callable[[Any], None], Any] = (result.set_result, work())
+        except Exception as error:  # noqa: BLE001 - handed to whoever waits
+            ended = (result.set_exception, error)
+        finally:
+            slots.release()
+        with suppress(RuntimeError):  # the loop has ended meanwhile
+            loop.call_soon_threadsafe(settle, *ended)
+
+    threading.Thread(target=copy_context().run, args=(run,), name="notification", daemon=True).start()
+    return await result
+
+
+# --- mail
+
+
+def _by_mail(job: Job, settings: Settings) -> str:
+    if settings.mail_server is None:
+        raise Refused(_("The server has no mail server: set INBAND_MAIL_SERVER."))
+    host, _colon, port = settings.mail_server.partition(":")
+    sender = settings.mail_from or f"inband@{host}"
+    mail = EmailMessage()
+    mail["Subject"] = " ".join(job.message.subject.split())
+    mail["From"], mail["To"] = sender, job.address
+    mail["Date"] = formatdate()
+    mail["Message-ID"] = f"<inband-{job.delivery}-{secrets.token_hex(8)}@{sender.partition('@')[2]}>"
+    mail["Auto-Submitted"] = "auto-generated"
+    mail.set_content(job.message.text)
+    if settings.mail_security == "tls":
+        server: smtplib.SMTP = smtplib.SMTP_SSL(host, int(port or 465), timeout=STEP, context=_tls())
+    else:
+        server = smtplib.SMTP(host, int(port or (587 if settings.mail_security == "starttls" else 25)), timeout=STEP)
+    with server:
+        if settings.mail_security == "starttls":
+            server.starttls(context=_tls())
+        if settings.mail_user:
+            server.login(settings.mail_user, settings.mail_password or "")
+        refused = server.send_message(mail)
+    return _short(str(refused)) if refused else _("The mail server has taken it.")
+
+
+@cache
+def _tls() -> ssl.SSLContext:
+    return ssl.create_default_context()
+
+
+# --- webhooks
+
+
+def signature(secret: str, timestamp: str, body: bytes) -> str:
+    """Proof for a receiver that a message is ours and fresh: HMAC-SHA256 of time, point and body, in hexadecimal."""
+    return hmac.new(secret.encode(), timestamp.encode() + b"." + body, hashlib.sha256).hexdigest()
+
+
+async def _to_webhook(job: Job, settings: Settings) -> Answer:
+    place = await _in_thread(_NAMES, lambda: place_of(job.address, settings))
+    body, timestamp = msgspec.json.encode(job.message.data), str(int(time.time()))
+    headers = {
+        "Content-Type": "application/json",
+        "User-Agent": f"Inband/{__version__}",
+        "X-Inband-Delivery": str(job.delivery),
+        "X-Inband-Timestamp": timestamp,
+        "X-Inband-Signature": f"sha256={signature(job.secret or '', timestamp, body)}",
+    }
+    async with httpx.AsyncClient(verify=_tls(), timeout=STEP, trust_env=False, follow_redirects=False) as client:
+        request = client.build_request("POST", job.address, content=body, headers=headers)
+        _connect_to(request, place)
+        answer = await client.send(request, stream=True)
+        try:
+            said = b""
+            async for chunk in answer.aiter_raw(LONGEST_ANSWER):
+                said += chunk
+                if len(said) >= LONGEST_ANSWER:
+                    break
+        finally:
+            await answer.aclose()
+    text = f"{answer.status_code} {answer.reason_phrase} {said.decode(errors='replace')}"
+    if answer.is_redirect:
+        text = _("{status} leads to another address, which is not followed").format(status=answer.status_code)
+    return Answer(answer.is_success, _short(text))
+
+
+def _connect_to(request: httpx.Request, place: Place) -> None:
+    """Send a request to the address that was checked, whatever the name service says by now."""
+    request.extensions["sni_hostname"] = place.host
+    request.url = request.url.copy_with(host=str(place.address))
+
+
+# --- apprise
+
+
+def _by_apprise(job: Job, settings: Settings) -> str:
+    if not settings.allow_apprise:
+        raise Refused(_("INBAND_ALLOW_APPRISE is not set any more."))
+    try:
+        from apprise import Apprise
+    except ImportError:
+        raise Refused(_("The library apprise is missing on the server: {command}").format(command=APPRISE)) from None
+    service = Apprise()
+    service.add(job.address)
+    if not service.notify(title=job.message.subject, body=job.message.text):
+        raise OSError(_("The service has not taken it."))
+    return _("The service has taken it.")
+
+
+def _short(text: str) -> str:
+    """An answer in one line that can be stored."""
+    return " ".join(text.replace("\0", "").split())[:LONGEST_ANSWER]

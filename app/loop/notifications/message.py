@@ -1,0 +1,120 @@
+"""Messages in words, and as the JSON that webhooks get."""
+
+import logging
+from collections.abc import Collection, Mapping, Sequence
+from datetime import datetime
+from typing import Any
+
+from app.language.i18n import _, ngettext
+from app.language.times import MINUTES, written
+from app.loop.alarm_response import wording
+from app.loop.alarm_response.queries import AlarmRow
+from app.loop.notifications.means import Message
+
+log = logging.getLogger(__name__)
+
+MOST_IN_WORDS = 20
+"""Alarms that a message describes; of more it says how many they are."""
+
+
+def of_alarms(rows: Sequence[AlarmRow], count: int, again: Collection[int], address: str) -> Message:
+    """A message about active alarms. rows: the first `MOST_IN_WORDS` of `count`; again: those it reminds of."""
+    reminder = len(again) >= count
+    if count == 1:
+        subject = f"{wording.kind_word(rows[0].alarm.kind)}: {_where(rows[0])}"
+    else:
+        subject = ngettext("{n} alarm", "{n} alarms", count).format(n=count)
+    if reminder:
+        subject = _("Reminder: {subject}").format(subject=subject)
+    parts = [_in_words(row, address) for row in rows]
+    if count > len(rows):
+        parts.append(_("… and {n} more: {link}").format(n=count - len(rows), link=f"{address}/alarms"))
+    parts.append(_("Acknowledge an alarm on its page; then nobody is reminded of it any more."))
+    data = {
+        "type": "alarms",
+        "reminder": reminder,
+        "subject": subject,
+        "count": count,
+        "alarms": [_as_json(row, address) for row in rows],
+    }
+    return Message(subject, "\n\n".join(parts) + "\n", data)
+
+
+def _where(row: AlarmRow) -> str:
+    names = [row.machine.name, row.characteristic.name if row.characteristic else None]
+    if row.alarm.tool_memory is not None:
+        names.append(_("tool {n}").format(n=row.alarm.tool_memory))
+    return ", ".join(name for name in names if name)
+
+
+def _in_words(row: AlarmRow, address: str) -> str:
+    alarm = row.alarm
+    times = ngettext("{n} time", "{n} times", alarm.count).format(n=alarm.count)
+    lines = (
+        f"{wording.kind_word(alarm.kind)}: {_where(row)}",
+        f"{written(alarm.raised_at, MINUTES)}{f', {times}' if alarm.count > 1 else ''}",
+        _sentence(row),
+        wording.what_to_do(alarm.kind),
+        _link(row, address),
+    )
+    return "\n".join(lines)
+
+
+def _sentence(row: AlarmRow) -> str:
+    """The statement of what is wrong. An alarm that cannot be worded must not keep the others waiting."""
+    try:
+        return wording.sentence(row.alarm)
+    except Exception:
+        log.exception("alarm %d cannot be worded", row.alarm.id)
+        return wording.kind_word(row.alarm.kind)
+
+
+def _link(row: AlarmRow, address: str) -> str:
+    return f"{address}/alarms/{row.alarm.id}"
+
+
+def _as_json(row: AlarmRow, address: str) -> dict[str, Any]:
+    alarm = row.alarm
+    return {
+        "id": alarm.id,
+        "kind": alarm.kind,
+        "word": wording.kind_word(alarm.kind),
+        "machine": row.machine.key,
+        "machine_name": row.machine.name,
+        "characteristic": row.characteristic.key if row.characteristic else None,
+        "characteristic_name": row.characteristic.name if row.characteristic else None,
+        "tool": alarm.tool_memory,
+        "raised_at": alarm.raised_at,
+        "count": alarm.count,
+        "text": _sentence(row),
+        "what_to_do": wording.what_to_do(alarm.kind),
+        "link": _link(row, address),
+    }
+
+
+def of_changes(changes: Sequence[Mapping[str, Any]], last: int, *, gap: bool) -> Message:
+    """Changes for a webhook. last: number of the last event; gap: some before were too old to be kept."""
+    subject = ngettext("{n} change", "{n} changes", len(changes)).format(n=len(changes))
+    return Message(subject, "", {"type": "changes", "last": last, "gap": gap, "changes": list(changes)})
+
+
+def change(number: int, at: datetime, said: Mapping[str, Any], address: str) -> dict[str, Any]:
+    """One change, with the number and the time of its event, and the address of what it is about."""
+    machine, characteristic = said.get("machine"), said.get("characteristic")
+    api = f"{address}/api/v1"
+    found = {
+        "alarm": f"{api}/alarms/{said.get('id')}",
+        "reading": f"{api}/readings/{characteristic}/{said.get('sequence')}",
+        "correction": f"{api}/corrections/{machine}/{said.get('number')}",
+        "tool": f"{api}/machines/{machine}/tools/{said.get('tool')}",
+    }
+    return {"event": number, "at": at, **said, "link": found.get(str(said.get("kind")), "")}
+
+
+def of_test(name: str, by: str, address: str) -> Message:
+    """A message that only shows that it arrives."""
+    subject = _("Inband: test")
+    text = _("{by} has sent this test to {name}. Notifications arrive here.").format(by=by, name=name)
+    return Message(
+        subject, f"{text}\n\n{address}\n", {"type": "test", "subject": subject, "text": text, "link": address}
+    )

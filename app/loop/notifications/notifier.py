@@ -1,0 +1,101 @@
+"""The task that sends notifications: it looks every two seconds for what is due, and delivers it beside everything else.
+
+It holds a connection of the database for moments only, never while it waits for a mail server; a receiver that hangs keeps none
+of the others waiting.
+"""
+
+import asyncio
+import logging
+from contextlib import suppress
+from datetime import date
+
+from sqlalchemy.exc import OperationalError
+
+from app.db.engine import Database
+from app.db.outage import Outage
+from app.loop.notifications import sending
+from app.loop.notifications.means import Answer, Job, deliver
+from app.settings import Settings
+
+log = logging.getLogger(__name__)
+
+EVERY = 2.0  # s between two looks
+TIDY = 3600.0  # s between two looks for what is old
+END_WITHIN = 3.0  # s for what is being delivered when the server ends; it is sent again if that was too short
+
+
+class Notifier:
+    """Sends notifications in one process."""
+
+    def __init__(self, database: Database, settings: Settings) -> None:
+        self._database = database
+        self._settings = settings
+        self._days_off = frozenset(date.fromisoformat(day) for day in settings.days_off.split(",") if day)
+        self._closing = asyncio.Event()
+        self._task: asyncio.Task[None] | None = None
+        self._deliveries: set[asyncio.Task[None]] = set()
+        self._outage = Outage(log, "notifications")
+
+    def start(self) -> None:
+        """Begin; call it on the loop that serves requests."""
+        self._task = asyncio.get_running_loop().create_task(self._run(), name="notifications")
+
+    async def stop(self) -> None:
+        """End, with a moment for what is being delivered."""
+        self._closing.set()
+        if self._task is not None:
+            await self._task
+        if self._deliveries:
+            _done, hanging = await asyncio.wait(self._deliveries, timeout=END_WITHIN)
+            for task in hanging:
+                task.cancel()
+            await asyncio.gather(*hanging, return_exceptions=True)
+
+    async def _run(self) -> None:
+        tidied = -TIDY
+        while not self._closing.is_set():
+            try:
+                await self.look()
+                now = asyncio.get_running_loop().time()
+                if now - tidied >= TIDY:
+                    tidied = now
+                    await asyncio.to_thread(self._tidy)
+                self._outage.is_over()
+            except OperationalError as error:
+                self._outage.goes_on(error)
+            except Exception:
+                log.exception("unhandled error in notifications")
+            with suppress(TimeoutError):
+                await asyncio.wait_for(self._closing.wait(), EVERY)
+
+    async def look(self) -> None:
+        """Begin what is due."""
+        for job in await asyncio.to_thread(self._plan):
+            task = asyncio.get_running_loop().create_task(self._deliver(job), name=f"delivery {job.delivery}")
+            self._deliveries.add(task)
+            task.add_done_callback(self._deliveries.discard)
+
+    async def _deliver(self, job: Job) -> None:
+        try:
+            answer = await deliver(job, self._settings)
+        except Exception as error:
+            log.exception("unhandled error in delivery %d", job.delivery)
+            answer = Answer(delivered=False, text=type(error).__name__)
+        if not answer.delivered:
+            log.warning("delivery %d to receiver %d failed: %s", job.delivery, job.receiver, answer.text)
+        try:
+            await asyncio.to_thread(self._end, job, answer)
+        except OperationalError as error:  # it counts as lost and is sent again
+            self._outage.goes_on(error)
+
+    def _plan(self) -> list[Job]:
+        with self._database.begin() as session:
+            return sending.plan(session, self._settings.address, self._days_off)
+
+    def _end(self, job: Job, answer: Answer) -> None:
+        with self._database.begin() as session:
+            sending.end(session, job, answer)
+
+    def _tidy(self) -> None:
+        with self._database.begin() as session:
+            sending.forget_old(session)

@@ -1,0 +1,232 @@
+"""Routes, receivers and deliveries as JSON."""
+
+from collections.abc import Iterable
+from datetime import datetime, time, timedelta
+from typing import Annotated, Any, Literal, Self
+
+from pydantic import BaseModel, Field, model_validator
+from pydantic_core import PydanticCustomError
+
+from app.core.notify import Hours, Route, Step
+from app.language.i18n import _
+from app.loop.notifications.tables import Delivery, NotificationRoute, Receiver
+from app.web.fields import LARGEST_ID, Body, Moment, Slug, Text200, answer_from
+
+Means = Literal["mail", "webhook", "apprise"]
+Tone = Literal["stop", "wear", "attention", "waiting", "steady"]
+Changes = Literal["alarm", "reading", "correction", "tool"]
+Clock = Annotated[str, Field(pattern=r"^([01]\d|2[0-3]):[0-5]\d$", description="By the plant's clock, such as 06:00.")]
+Minutes = Annotated[int, Field(strict=True, ge=0, le=7 * 24 * 60)]
+Day = Annotated[int, Field(strict=True, ge=1, le=7)]
+
+
+class HoursIn(Body):
+    """A part of the week."""
+
+    days: Annotated[list[Day], Field(min_length=1, max_length=7, description="1 Monday to 7 Sunday, when it begins.")]
+    begins: Clock
+    ends: Annotated[Clock, Field(description="On the next day where it is not after `begins`.")]
+
+    def value(self) -> Hours:
+        """As the core reads it."""
+        return Hours(frozenset(self.days), time.fromisoformat(self.begins), time.fromisoformat(self.ends))
+
+
+Week = Annotated[list[HoursIn], Field(max_length=20)]
+
+
+class StepIn(Body):
+    """Receivers, and after how many minutes they are notified of an alarm that is still active."""
+
+    after: Annotated[Minutes, Field(description="Minutes after the alarm.")] = 0
+    receivers: Annotated[
+        list[Annotated[int, Field(strict=True, ge=1, le=LARGEST_ID)]],
+        Field(min_length=1, max_length=50, description="Numbers of receivers."),
+    ]
+
+
+class Rule(Body):
+    """The alarms of a route, when they go, and to whom. A list that is empty limits nothing."""
+
+    kinds: Annotated[list[Slug], Field(max_length=100, description="Kinds of alarms, such as tool_worn.")] = Field(
+        default_factory=list
+    )
+    tones: Annotated[list[Tone], Field(max_length=5, description="How urgent the alarms are.")] = Field(
+        default_factory=list
+    )
+    machines: Annotated[list[Slug], Field(max_length=500, description="Keys of machines.")] = Field(
+        default_factory=list
+    )
+    characteristics: Annotated[list[Slug], Field(max_length=500, description="Keys of characteristics.")] = Field(
+        default_factory=list
+    )
+    hours: Annotated[Week, Field(description="When the route is open; always where empty.")] = Field(
+        default_factory=list
+    )
+    on_days_off: Annotated[bool, Field(description="Open on days off too.")] = True
+    urgent: Annotated[bool, Field(description="Through the quiet hours of receivers.")] = False
+    repeat: Annotated[Minutes, Field(description="Minutes between reminders until it is acknowledged; 0: none.")] = 0
+    digest: Annotated[Minutes, Field(description="Minutes that a first message waits for other alarms.")] = 0
+    hold_off: Annotated[
+        Minutes, Field(description="Minutes in which the same alarm, raised again, is not announced again.")
+    ] = 5
+    steps: Annotated[list[StepIn], Field(min_length=1, max_length=10, description="Who is notified, in order.")]
+
+    @model_validator(mode="after")
+    def _in_order(self) -> Self:
+        after = [step.after for step in self.steps]
+        if after != sorted(after):
+            raise PydanticCustomError("order", _("must come in the order of their minutes"), {"at": "steps"})
+        return self
+
+    def value(self) -> Route:
+        """As the core reads it."""
+        return Route(
+            tuple(Step(timedelta(minutes=step.after), tuple(step.receivers)) for step in self.steps),
+            kinds=frozenset(self.kinds),
+            tones=frozenset(self.tones),
+            machines=frozenset(self.machines),
+            characteristics=frozenset(self.characteristics),
+            hours=week(self.hours),
+            on_days_off=self.on_days_off,
+            urgent=self.urgent,
+            repeat=timedelta(minutes=self.repeat),
+            digest=timedelta(minutes=self.digest),
+            hold_off=timedelta(minutes=self.hold_off),
+        )
+
+
+def week(hours: Iterable[HoursIn]) -> tuple[Hours, ...]:
+    """Parts of the week as the core reads them."""
+    return tuple(each.value() for each in hours)
+
+
+class RouteIn(Rule):
+    """A route."""
+
+    name: Text200
+    enabled: bool = True
+
+
+class RouteOut(RouteIn):
+    """A route as it is stored."""
+
+    id: int
+    created_at: datetime
+    created_by: str
+
+    @classmethod
+    def of(cls, row: NotificationRoute) -> Self:
+        """A route of the table."""
+        return cls(
+            id=row.id,
+            name=row.name,
+            enabled=row.enabled,
+            created_at=row.created_at,
+            created_by=row.created_by,
+            **row.rule,
+        )
+
+
+class ReceiverIn(Body):
+    """A receiver of notifications."""
+
+    name: Text200
+    means: Means
+    address: Annotated[
+        str,
+        Field(min_length=3, max_length=1000, description="A mail address, an address of the web, or one of apprise."),
+    ]
+    quiet: Annotated[Week, Field(description="Quiet hours: then only urgent routes reach it.")] = Field(
+        default_factory=list
+    )
+    away_until: Annotated[Moment | None, Field(description="Nothing is sent before.")] = None
+    events: Annotated[
+        list[Changes],
+        Field(max_length=4, description="A webhook gets these changes too, all of them, in their order."),
+    ] = Field(default_factory=list)
+
+    @model_validator(mode="after")
+    def _fits(self) -> Self:
+        if self.events and self.means != "webhook":
+            raise PydanticCustomError("events", _("go to webhooks only"), {"at": "events"})
+        return self
+
+
+class ReceiverChange(Body):
+    """Changes of a receiver; what is left out stays."""
+
+    name: Text200 | None = None
+    address: Annotated[str | None, Field(min_length=3, max_length=1000, description="Of the same means.")] = None
+    quiet: Annotated[Week | None, Field(description="Quiet hours: then only urgent routes reach it.")] = None
+    away_until: Annotated[Moment | None, Field(description="Nothing is sent before; null: it is there.")] = None
+    events: Annotated[list[Changes] | None, Field(max_length=4, description="Of a webhook.")] = None
+
+
+class OwnAddressIn(Body):
+    """One's own mail address for notifications."""
+
+    address: Annotated[str, Field(min_length=3, max_length=320, description="A mail address.")]
+    quiet: Annotated[Week, Field(description="Quiet hours: then only urgent routes reach it.")] = Field(
+        default_factory=list
+    )
+    away_until: Annotated[Moment | None, Field(description="Nothing is sent before.")] = None
+
+
+class ReceiverOut(BaseModel):
+    """A receiver of notifications."""
+
+    id: int
+    name: str
+    means: Means
+    address: Annotated[str, Field(description="Of apprise only the service: the rest is a secret.")]
+    person: Annotated[int | None, Field(description="Number of the person whose own address it is.")]
+    quiet: Annotated[list[HoursIn], Field(description="Quiet hours.")]
+    away_until: Annotated[datetime | None, Field(description="Nothing is sent before.")]
+    events: Annotated[list[Changes], Field(description="Changes that it gets as they happen.")]
+    failures: Annotated[int, Field(description="Failures in a row; 0: the last message arrived.")]
+    retry_at: Annotated[datetime | None, Field(description="It is not tried again before.")]
+    last_at: Annotated[datetime | None, Field(description="When a message about alarms was delivered last.")]
+    created_at: datetime
+    created_by: Annotated[str, Field(description="Who added it.")]
+
+    @classmethod
+    def of(cls, row: Receiver, **more: Any) -> Self:
+        """A receiver of the table, without its secret."""
+        return answer_from(cls, row, address=shown_address(row), person=row.person_id, **more)
+
+
+class NewReceiverOut(ReceiverOut):
+    """A receiver just added."""
+
+    secret: Annotated[
+        str | None, Field(description="Of a webhook: its messages are signed with it. Shown this once; null otherwise.")
+    ]
+
+
+def shown_address(row: Receiver) -> str:
+    """Its address as people may see it."""
+    return f"{row.address.partition('://')[0]}://…" if row.means == "apprise" else row.address
+
+
+class DeliveryOut(BaseModel):
+    """An attempt to deliver a message."""
+
+    id: int
+    receiver: Annotated[int, Field(description="Number of the receiver.")]
+    about: Annotated[Literal["alarms", "changes", "test"], Field(description="Its content.")]
+    subject: str
+    alarms: Annotated[list[int], Field(description="Numbers of the alarms in it.")]
+    changes: Annotated[int, Field(description="How many changes are in it.")]
+    state: Annotated[
+        Literal["waiting", "sending", "delivered", "failed", "lost"],
+        Field(description="`lost`: the server ended meanwhile; it is sent again."),
+    ]
+    asked_at: Annotated[datetime, Field(description="When it was due.")]
+    ended_at: datetime | None
+    answer: Annotated[str | None, Field(description="What the receiver's server answered, or why it was not reached.")]
+
+    @classmethod
+    def of(cls, row: Delivery) -> Self:
+        """A delivery of the table."""
+        return answer_from(cls, row, receiver=row.receiver_id)

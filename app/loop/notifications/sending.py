@@ -1,0 +1,260 @@
+"""Deliveries that are due, and the end of each. Every function is one short transaction; none of them waits for others.
+
+One process plans at a time. A delivery that it has begun is its own until `BUSY` is over; then it counts as lost, and what was
+in it is sent again.
+"""
+
+from collections.abc import Iterable
+from datetime import date, datetime, timedelta
+from typing import Any
+
+from sqlalchemy import delete, func, or_, select, text, update
+from sqlalchemy.dialects.postgresql import insert
+from sqlalchemy.orm import Session
+
+from app.access.queries import WITHOUT_ACCESS
+from app.core import notify
+from app.core.notify import Notice, Raised, Record, notices, pause_after
+from app.db.events import publish
+from app.db.tables import Event
+from app.language.times import plant_zone
+from app.loop.alarm_response.queries import AlarmRow, alarm
+from app.loop.alarms.kinds import kind_named
+from app.loop.notifications import message
+from app.loop.notifications.means import Answer, Job, Message
+from app.loop.notifications.schemas import HoursIn, Rule, week
+from app.loop.notifications.tables import Announced, Delivery, NotificationRoute, Receiver
+from app.loop.tables.alarms import Alarm
+from app.loop.tables.characteristics import Characteristic
+from app.loop.tables.machines import Machine
+
+BUSY = timedelta(minutes=1)
+KEPT = timedelta(days=31)
+"""Time that deliveries stay on record, and what was announced."""
+CHATTER = timedelta(days=7)
+"""As far back as the same alarm is looked for: the longest hold-off."""
+MOST_ALARMS = 5_000
+MOST_AT_ONCE = 16
+"""Messages about alarms that are begun in one look; the others are begun in the next one."""
+MOST_EVENTS, MOST_CHANGES = 2_000, 2_000
+"""Of one message about changes: events looked through, and changes in it, more only if they are of one event."""
+_PLANNING = text("SELECT pg_try_advisory_xact_lock(7291, 'delivery'::regclass::oid::int4)")
+
+
+def plan(session: Session, address: str, days_off: frozenset[date]) -> list[Job]:
+    """Begin every delivery that is due: tests, messages about alarms, changes for webhooks.
+
+    address: of this server, for links. Another process that plans at this moment leaves nothing to do.
+    """
+    rows = {
+        row.id: row
+        for row in session.scalars(
+            select(Receiver).where(
+                Receiver.deleted_at.is_(None),
+                or_(Receiver.person_id.is_(None), Receiver.person_id.not_in(WITHOUT_ACCESS)),
+            )
+        )
+    }
+    if not rows or not session.scalar(_PLANNING):
+        return []
+    now: datetime = session.scalars(select(func.clock_timestamp())).one()
+    _give_up(session, now)
+    free = {number for number, row in rows.items() if row.busy_until is None or row.busy_until <= now}
+    jobs = _tests(session, rows, free, address)
+    free -= {job.receiver for job in jobs}
+    free -= {number for number, row in rows.items() if row.retry_at is not None and row.retry_at > now}
+    about_alarms = _about_alarms(session, rows, free, address, days_off, now)
+    free -= {job.receiver for job in about_alarms}
+    jobs += about_alarms
+    jobs += filter(None, (_about_changes(session, rows[number], address) for number in sorted(free)))
+    for job in jobs:
+        rows[job.receiver].busy_until = now + BUSY
+    return jobs
+
+
+def _give_up(session: Session, now: datetime) -> None:
+    """Note which deliveries a server has begun and not ended."""
+    session.execute(
+        update(Delivery)
+        .where(Delivery.state == "sending", Delivery.asked_at < now - 2 * BUSY)
+        .values(state="lost", ended_at=now)
+    )
+
+
+def _job(session: Session, row: Receiver, about: str, made: Message, **more: Any) -> Job:
+    """Note that a delivery begins."""
+    alarms = more.get("alarms", ())
+    changes = len(made.data.get("changes", ()))
+    delivery = Delivery(
+        receiver_id=row.id, about=about, subject=made.subject, alarms=list(alarms), changes=changes, state="sending"
+    )
+    session.add(delivery)
+    session.flush()
+    made.data["delivery"] = delivery.id
+    return Job(delivery.id, row.id, about, row.means, row.address, row.secret, made, **more)
+
+
+def _tests(session: Session, rows: dict[int, Receiver], free: set[int], address: str) -> list[Job]:
+    waiting = session.scalars(
+        select(Delivery).where(Delivery.state == "waiting", Delivery.receiver_id.in_(free)).order_by(Delivery.id)
+    )
+    jobs: dict[int, Job] = {}
+    for delivery in waiting:
+        row = rows[delivery.receiver_id]
+        if row.id in jobs:
+            continue
+        delivery.state = "sending"
+        made = message.of_test(row.name, delivery.asked_by or "", address)
+        made.data["delivery"] = delivery.id
+        jobs[row.id] = Job(delivery.id, row.id, "test", row.means, row.address, row.secret, made)
+    return list(jobs.values())
+
+
+# --- alarms
+
+
+def _about_alarms(
+    session: Session, rows: dict[int, Receiver], free: set[int], address: str, days_off: frozenset[date], now: datetime
+) -> list[Job]:
+    stored = session.scalars(select(NotificationRoute.rule).where(NotificationRoute.enabled)).all()
+    active = _active(session) if stored else []
+    if not active:
+        return []
+    receivers = {
+        number: notify.Receiver(
+            number,
+            week(map(HoursIn.model_validate, row.quiet)),
+            row.away_until,
+            row.last_at,
+            failing=row.failures > 0,
+            busy=number not in free,
+        )
+        for number, row in rows.items()
+    }
+    routes = [Rule.model_validate(rule).value() for rule in stored]
+    found = notices(routes, receivers, active, _record(session, active, now), now, plant_zone(), days_off)
+    return [_alarm_job(session, rows[notice.receiver], notice, address) for notice in found[:MOST_AT_ONCE]]
+
+
+def _alarm_job(session: Session, row: Receiver, notice: Notice, address: str) -> Job:
+    told: list[AlarmRow] = [alarm(session, number) for number in notice.alarms[: message.MOST_IN_WORDS]]
+    made = message.of_alarms(told, len(notice.alarms), notice.again, address)
+    return _job(session, row, "alarms", made, alarms=notice.alarms)
+
+
+def _active(session: Session) -> list[Raised]:
+    rows = session.execute(
+        select(Alarm.id, Alarm.kind, Machine.key, Characteristic.key, Alarm.tool_memory, Alarm.raised_at)
+        .join(Machine, Machine.id == Alarm.machine_id)
+        .outerjoin(
+            Characteristic,
+            (Characteristic.machine_id == Alarm.machine_id) & (Characteristic.id == Alarm.characteristic_id),
+        )
+        .where(Alarm.acknowledged_at.is_(None))
+        .order_by(Alarm.id.desc())
+        .limit(MOST_ALARMS)
+    )
+    return [
+        Raised(number, kind, kind_named(kind).tone, machine, characteristic, tool, at)
+        for number, kind, machine, characteristic, tool, at in rows
+    ]
+
+
+def _record(session: Session, active: Iterable[Raised], now: datetime) -> Record:
+    """Announcements of the active alarms, and of the same causes lately."""
+    causes = {each.cause for each in active}
+    rows = session.execute(
+        select(
+            Announced.alarm_id,
+            Announced.receiver_id,
+            Announced.at,
+            Alarm.kind,
+            Machine.key,
+            Characteristic.key,
+            Alarm.tool_memory,
+        )
+        .join(Alarm, Alarm.id == Announced.alarm_id)
+        .join(Machine, Machine.id == Alarm.machine_id)
+        .outerjoin(
+            Characteristic,
+            (Characteristic.machine_id == Alarm.machine_id) & (Characteristic.id == Alarm.characteristic_id),
+        )
+        .where(or_(Announced.at > now - CHATTER, Alarm.acknowledged_at.is_(None)))
+        .order_by(Announced.at)
+    ).all()
+    known = {(number, receiver): at for number, receiver, at, *_cause in rows}
+    of_causes = {
+        (cause, receiver): at
+        for _number, receiver, at, *names in rows
+        if (cause := (names[0], names[1], names[2], names[3])) in causes
+    }
+    return Record(known, of_causes)
+
+
+# --- changes
+
+
+def _about_changes(session: Session, row: Receiver, address: str) -> Job | None:
+    """The next changes for a webhook, in the order of the commits; None where there are none."""
+    if not row.events:
+        return None
+    events = session.execute(
+        select(Event.id, Event.at, Event.changes).where(Event.id > row.cursor).order_by(Event.id).limit(MOST_EVENTS)
+    ).all()
+    if not events:
+        return None
+    oldest = session.scalars(select(func.min(Event.id))).one() or 0
+    last, changes = row.cursor, list[dict[str, Any]]()
+    for number, at, published in events:
+        mine = [message.change(number, at, said, address) for said in published if said.get("kind") in row.events]
+        if changes and len(changes) + len(mine) > MOST_CHANGES:
+            break
+        changes += mine
+        last = number
+    if not changes:
+        row.cursor = last
+        return None
+    return _job(session, row, "changes", message.of_changes(changes, last, gap=oldest > row.cursor + 1), cursor=last)
+
+
+# --- the end of a delivery
+
+
+def end(session: Session, job: Job, answer: Answer) -> None:
+    """Keep what came of a delivery; a receiver that was not reached pauses, the longer the more often it fails."""
+    now: datetime = session.scalars(select(func.clock_timestamp())).one()
+    delivery = session.get(Delivery, job.delivery, with_for_update=True)
+    row = session.get(Receiver, job.receiver, with_for_update=True)
+    if delivery is None or row is None:
+        return
+    delivery.state = "delivered" if answer.delivered else "failed"
+    delivery.ended_at, delivery.answer = now, answer.text
+    row.busy_until = None
+    if answer.delivered:
+        row.failures, row.retry_at = 0, None
+        _arrived(session, row, job, now)
+    else:
+        row.failures += 1
+        row.retry_at = now + pause_after(row.failures)
+    publish(session, {"kind": "delivery", "id": job.delivery})
+
+
+def _arrived(session: Session, row: Receiver, job: Job, now: datetime) -> None:
+    if job.cursor is not None:
+        row.cursor = max(row.cursor, job.cursor)
+    if not job.alarms:
+        return
+    row.last_at = now
+    values = [{"alarm_id": number, "receiver_id": row.id, "at": now} for number in job.alarms]
+    added = insert(Announced).values(values)
+    session.execute(
+        added.on_conflict_do_update(index_elements=["alarm_id", "receiver_id"], set_={"at": added.excluded.at})
+    )
+
+
+def forget_old(session: Session) -> None:
+    """Delete deliveries that are older than `KEPT`, and what was announced of alarms that are acknowledged that long."""
+    before = func.now() - KEPT
+    session.execute(delete(Delivery).where(Delivery.asked_at < before))
+    old = select(Alarm.id).where(Alarm.id == Announced.alarm_id, Alarm.acknowledged_at.is_not(None))
+    session.execute(delete(Announced).where(Announced.at < before, old.exists()))

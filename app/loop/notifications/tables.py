@@ -1,0 +1,101 @@
+"""Receivers of notifications, routes to them, what was announced to whom, and each delivery.
+
+An active alarm and `Announced` say together what is still to be sent, so nothing is announced before it is committed, and a
+server that ends in between sends it later. Changes for webhooks stand in the journal of events, in the order of the commits.
+"""
+
+from datetime import datetime
+from typing import Any
+
+from sqlalchemy import BigInteger, CheckConstraint, ForeignKey, Index, Sequence, func, text
+from sqlalchemy.orm import Mapped, mapped_column
+
+from app.db.base import Base
+
+RECEIVER_NUMBERS = Sequence("receiver_id", metadata=Base.metadata)
+ROUTE_NUMBERS = Sequence("notification_route_id", metadata=Base.metadata)
+DELIVERY_NUMBERS = Sequence("delivery_id", metadata=Base.metadata)
+
+
+class Receiver(Base):
+    """Somebody's mail address, a webhook, or an address of apprise. Deleted ones stay, because deliveries name them."""
+
+    __tablename__ = "receiver"
+    __table_args__ = (
+        CheckConstraint("means IN ('mail', 'webhook', 'apprise')", name="means"),
+        Index(
+            "receiver_person_key",
+            "person_id",
+            unique=True,
+            postgresql_where=text("person_id IS NOT NULL AND deleted_at IS NULL"),
+        ),
+        {"postgresql_with": {"fillfactor": 50}},
+    )
+
+    id: Mapped[int] = mapped_column(BigInteger, primary_key=True, server_default=text("nextval('receiver_id')"))
+    name: Mapped[str]
+    means: Mapped[str]
+    address: Mapped[str]
+    secret: Mapped[str | None]  # a webhook's messages are signed with it
+    person_id: Mapped[int | None] = mapped_column(ForeignKey("person.id"))  # whose own address it is
+    quiet: Mapped[list[Any]] = mapped_column(server_default="[]")
+    away_until: Mapped[datetime | None]
+    events: Mapped[list[Any]] = mapped_column(server_default="[]")  # kinds of changes that a webhook gets
+    cursor: Mapped[int] = mapped_column(BigInteger, server_default="0")  # the last event of the journal that it has
+    failures: Mapped[int] = mapped_column(server_default="0")  # in a row
+    retry_at: Mapped[datetime | None]
+    busy_until: Mapped[datetime | None]  # a delivery is under way; later than that it counts as lost
+    last_at: Mapped[datetime | None]  # of the last message about alarms
+    created_at: Mapped[datetime] = mapped_column(server_default=func.now())
+    created_by: Mapped[str]
+    deleted_at: Mapped[datetime | None]
+
+
+class NotificationRoute(Base):
+    """A route: `rule` is `schemas.Rule`."""
+
+    __tablename__ = "notification_route"
+
+    id: Mapped[int] = mapped_column(
+        BigInteger, primary_key=True, server_default=text("nextval('notification_route_id')")
+    )
+    name: Mapped[str]
+    enabled: Mapped[bool] = mapped_column(server_default="true")
+    rule: Mapped[dict[str, Any]]
+    created_at: Mapped[datetime] = mapped_column(server_default=func.now())
+    created_by: Mapped[str]
+
+
+class Announced(Base):
+    """The last time that a receiver was notified of an alarm."""
+
+    __tablename__ = "announced"
+    __table_args__ = (Index("announced_at_idx", "at"),)
+
+    alarm_id: Mapped[int] = mapped_column(BigInteger, primary_key=True, autoincrement=False)
+    receiver_id: Mapped[int] = mapped_column(ForeignKey("receiver.id"), primary_key=True, autoincrement=False)
+    at: Mapped[datetime]
+
+
+class Delivery(Base):
+    """One attempt to deliver a message, and what was answered. alarms, changes: their numbers in it."""
+
+    __tablename__ = "delivery"
+    __table_args__ = (
+        CheckConstraint("about IN ('alarms', 'changes', 'test')", name="about"),
+        CheckConstraint("state IN ('waiting', 'sending', 'delivered', 'failed', 'lost')", name="state"),
+        Index("delivery_open_idx", "receiver_id", postgresql_where=text("state IN ('waiting', 'sending')")),
+        Index("delivery_asked_idx", "asked_at"),
+    )
+
+    id: Mapped[int] = mapped_column(BigInteger, primary_key=True, server_default=text("nextval('delivery_id')"))
+    receiver_id: Mapped[int] = mapped_column(ForeignKey("receiver.id"))
+    about: Mapped[str]
+    subject: Mapped[str]
+    alarms: Mapped[list[Any]] = mapped_column(server_default="[]")
+    changes: Mapped[int] = mapped_column(server_default="0")
+    state: Mapped[str]
+    asked_at: Mapped[datetime] = mapped_column(server_default=func.now())
+    asked_by: Mapped[str | None]  # of a test
+    ended_at: Mapped[datetime | None]
+    answer: Mapped[str | None]

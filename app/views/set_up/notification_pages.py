@@ -1,0 +1,294 @@
+"""Pages of notifications: receivers, routes and deliveries for administrators; one's own mail address."""
+
+from collections.abc import Mapping
+from functools import partial
+from typing import Any
+
+from fastapi import APIRouter, Request, Response
+from sqlalchemy.orm import Session
+from starlette.responses import RedirectResponse
+
+from app.access.deps import Admin, Caller, Viewer
+from app.errors import Conflict, InbandError, Invalid
+from app.language.i18n import _
+from app.loop.alarms.kinds import kinds
+from app.loop.notifications import actions, queries
+from app.loop.notifications.schemas import OwnAddressIn, ReceiverIn, RouteIn, shown_address
+from app.loop.notifications.wording import changes_word, delivery_word, means_word, tones, when
+from app.views.set_up.frame import setup_page
+from app.web.deps import Before, FormDep, SessionDep, SettingsDep
+from app.web.forms import by_field, parsed, whole
+from app.web.paging import address, part_of
+from app.web.states import word_of
+from app.web.templates import page
+
+router = APIRouter(include_in_schema=False)
+ON_PAGE = 50
+MOST_STEPS = 3
+EVERY_DAY = range(1, 8)
+
+
+@router.get("/setup/notifications")
+def notifications_page(request: Request, session: SessionDep, caller: Admin, before: Before = None) -> Response:
+    return _overview(request, session, caller, before=before)
+
+
+@router.post("/setup/notifications/receivers")
+def send_receiver(
+    request: Request, session: SessionDep, caller: Admin, settings: SettingsDep, form: FormDep
+) -> Response:
+    """Add a receiver. The answer shows the secret of a webhook, this once, so it is no redirect then."""
+    try:
+        given = parsed(
+            ReceiverIn,
+            {name: form.get(name, "").strip() for name in ("name", "means", "address")}
+            | {"quiet": _hours(form, "quiet", EVERY_DAY), "events": _ticked(form, "events")},
+        )
+        row = actions.add_receiver(session, given, caller, settings)
+    except InbandError as error:
+        return _overview(request, session, caller, typed=form, error=error)
+    if row.secret is None:
+        return RedirectResponse("/setup/notifications?done=added", 303)
+    return _overview(request, session, caller, secret={"name": row.name, "secret": row.secret})
+
+
+@router.post("/setup/notifications/receivers/{receiver}/test")
+def send_test(session: SessionDep, caller: Admin, receiver: int) -> Response:
+    actions.ask_for_test(session, receiver, caller)
+    return RedirectResponse("/setup/notifications?done=test-sent#deliveries", 303)
+
+
+@router.post("/setup/notifications/receivers/{receiver}/delete")
+def send_delete_receiver(request: Request, session: SessionDep, caller: Admin, receiver: int) -> Response:
+    try:
+        with session.begin_nested():
+            actions.delete_receiver(session, receiver, caller)
+    except InbandError as error:
+        if error.status == 404:
+            raise
+        return _overview(request, session, caller, error=error)
+    return RedirectResponse("/setup/notifications?done=deleted", 303)
+
+
+def _overview(
+    request: Request,
+    session: Session,
+    caller: Caller,
+    *,
+    before: int | None = None,
+    typed: Mapping[str, str] | None = None,
+    error: InbandError | None = None,
+    secret: Mapping[str, str] | None = None,
+) -> Response:
+    rows = queries.deliveries(session, before=before, limit=ON_PAGE + 1)
+    receivers = queries.receivers(session)
+    names = {row.id: row.name for row in receivers}
+    return setup_page(
+        request,
+        "notifications.html",
+        caller,
+        "notifications",
+        status=error.status if error else 200,
+        receivers=receivers,
+        routes=[(row, _summary(row.rule, names)) for row in queries.routes(session)],
+        part=part_of(rows, ON_PAGE, before, lambda row: row.delivery.id, partial(address, "/setup/notifications")),
+        typed=typed or {},
+        errors=by_field(error) if error else {},
+        problem=error if error and not error.errors else None,
+        secret=secret,
+        means=[(name, means_word(name)) for name in ("mail", "webhook", "apprise")],
+        means_word=means_word,
+        changes=[(name, changes_word(name)) for name in ("alarm", "reading", "correction", "tool")],
+        delivery_word=delivery_word,
+        shown_address=shown_address,
+    )
+
+
+def _summary(rule: Mapping[str, Any], names: Mapping[int, str]) -> dict[str, str]:
+    """A route in words: its alarms, its hours, its receivers."""
+    alarms = [*map(word_of, rule["kinds"]), *map(dict(tones()).__getitem__, rule["tones"])]
+    places = [*rule["machines"], *rule["characteristics"]]
+    steps = []
+    for step in rule["steps"]:
+        whom = ", ".join(names.get(number, str(number)) for number in step["receivers"])
+        steps.append(_("after {n} min {names}").format(n=step["after"], names=whom) if step["after"] else whom)
+    return {
+        "alarms": ", ".join(alarms) or _("all"),
+        "places": ", ".join(places) or _("all"),
+        "when": "; ".join(map(when, rule["hours"])) or _("always"),
+        "steps": "; ".join(steps),
+    }
+
+
+# --- routes
+
+
+@router.get("/setup/notifications/routes/new")
+def new_route(request: Request, session: SessionDep, caller: Admin) -> Response:
+    return _route(request, session, caller, {"hold_off": "5", "enabled": "true", "on_days_off": "true"})
+
+
+@router.post("/setup/notifications/routes/new")
+def send_new_route(request: Request, session: SessionDep, caller: Admin, form: FormDep) -> Response:
+    return _send_route(request, session, caller, form, None)
+
+
+@router.get("/setup/notifications/routes/{route}")
+def route_page(request: Request, session: SessionDep, caller: Admin, route: int) -> Response:
+    row = queries.route(session, route)
+    fields = _fields(row.rule) | {"name": row.name} | ({"enabled": "true"} if row.enabled else {})
+    return _route(request, session, caller, fields, route, fits=_fits(row.rule))
+
+
+@router.post("/setup/notifications/routes/{route}")
+def send_route(request: Request, session: SessionDep, caller: Admin, route: int, form: FormDep) -> Response:
+    if form.get("do") == "delete":
+        actions.delete_route(session, route, caller)
+        return RedirectResponse("/setup/notifications?done=deleted", 303)
+    if not _fits(queries.route(session, route).rule):
+        raise Conflict(_("This route has more steps or hours than the form."), _("Change it by REST."))
+    return _send_route(request, session, caller, form, route)
+
+
+def _send_route(
+    request: Request, session: Session, caller: Caller, form: Mapping[str, str], number: int | None
+) -> Response:
+    try:
+        given = parsed(RouteIn, _read(form))
+        if number is None:
+            actions.add_route(session, given, caller)
+        else:
+            actions.change_route(session, number, given, caller)
+    except Invalid as error:
+        return _route(request, session, caller, form, number, error)
+    return RedirectResponse(f"/setup/notifications?done={'added' if number is None else 'changed'}", 303)
+
+
+def _route(
+    request: Request,
+    session: Session,
+    caller: Caller,
+    form: Mapping[str, str],
+    number: int | None = None,
+    error: Invalid | None = None,
+    *,
+    fits: bool = True,
+) -> Response:
+    errors = by_field(error) if error else {}
+    return setup_page(
+        request,
+        "notification_route.html",
+        caller,
+        "notifications",
+        status=error.status if error else 200,
+        number=number,
+        fits=fits,
+        form=form,
+        errors=errors,
+        other_errors=[text for field, text in errors.items() if field.startswith(("steps", "hours", "kinds", "tones"))],
+        kinds=sorted(((kind.name, kind.word()) for kind in kinds()), key=lambda kind: kind[1]),
+        tones=tones(),
+        receivers=queries.receivers(session),
+        steps=range(1, MOST_STEPS + 1),
+    )
+
+
+def _read(form: Mapping[str, str]) -> dict[str, Any]:
+    """The form of a route as the API has it."""
+    flags = {name: form.get(name) == "true" for name in ("enabled", "on_days_off", "urgent")}
+    minutes = {name: whole(form.get(name)) or 0 for name in ("repeat", "digest", "hold_off")}
+    steps = [
+        {"after": whole(form.get(f"after-{at}")) or 0, "receivers": [int(each) for each in chosen if each.isdecimal()]}
+        for at in range(1, MOST_STEPS + 1)
+        if (chosen := _ticked(form, f"step-{at}"))
+    ]
+    return {
+        "name": form.get("name"),
+        "kinds": _ticked(form, "kind"),
+        "tones": _ticked(form, "tone"),
+        "machines": form.get("machines", "").replace(",", " ").split(),
+        "characteristics": form.get("characteristics", "").replace(",", " ").split(),
+        "hours": _hours(form, "hours", [int(day) for day in _ticked(form, "day") if day.isdecimal()] or EVERY_DAY),
+        "steps": steps,
+        **flags,
+        **minutes,
+    }
+
+
+def _fits(rule: Mapping[str, Any]) -> bool:
+    """Tell if the form holds all of a route that came by REST."""
+    return len(rule["hours"]) <= 1 and len(rule["steps"]) <= MOST_STEPS
+
+
+def _fields(rule: Mapping[str, Any]) -> dict[str, str]:
+    """The form of a stored route; of its hours the first."""
+    fields = {name: str(rule[name]) for name in ("repeat", "digest", "hold_off")}
+    fields |= {name: "true" for name in ("on_days_off", "urgent") if rule[name]}
+    fields |= {f"kind-{each}": "true" for each in rule["kinds"]} | {f"tone-{each}": "true" for each in rule["tones"]}
+    for hours in rule["hours"][:1]:
+        fields |= {"hours-begins": hours["begins"], "hours-ends": hours["ends"]}
+        fields |= {f"day-{day}": "true" for day in hours["days"]}
+    for at, step in enumerate(rule["steps"][:MOST_STEPS], 1):
+        fields |= {f"after-{at}": str(step["after"])} | {f"step-{at}-{each}": "true" for each in step["receivers"]}
+    names = {name: ", ".join(rule[name]) for name in ("machines", "characteristics")}
+    return fields | names
+
+
+def _ticked(form: Mapping[str, str], name: str) -> list[str]:
+    """The choices of a group of ticks, `name-choice`."""
+    return [field.removeprefix(f"{name}-") for field, value in form.items() if field.startswith(f"{name}-") and value]
+
+
+def _hours(form: Mapping[str, str], name: str, days: Any) -> list[dict[str, Any]]:
+    begins, ends = form.get(f"{name}-begins", "").strip()[:5], form.get(f"{name}-ends", "").strip()[:5]
+    return [{"days": list(days), "begins": begins, "ends": ends}] if begins or ends else []
+
+
+# --- one's own address
+
+
+@router.get("/account/notifications")
+def own_page(request: Request, session: SessionDep, caller: Viewer, done: str = "") -> Response:
+    return _own(request, session, caller, None, done=done)
+
+
+@router.post("/account/notifications")
+def send_own(request: Request, session: SessionDep, caller: Viewer, settings: SettingsDep, form: FormDep) -> Response:
+    try:
+        with session.begin_nested():
+            if form.get("do") == "delete":
+                actions.delete_own(session, caller)
+            else:
+                sent = {"address": form.get("address", "").strip(), "quiet": _hours(form, "quiet", EVERY_DAY)}
+                actions.set_own(session, parsed(OwnAddressIn, sent), caller, settings)
+    except InbandError as error:
+        if error.status == 403:
+            raise
+        return _own(request, session, caller, form, error=error)
+    return RedirectResponse(f"/account/notifications?done={form.get('do') or 'saved'}", 303)
+
+
+def _own(
+    request: Request,
+    session: Session,
+    caller: Caller,
+    form: Mapping[str, str] | None,
+    *,
+    done: str = "",
+    error: InbandError | None = None,
+) -> Response:
+    row = queries.own(session, caller.person_id) if caller.person_id is not None else None
+    if form is None:
+        quiet = row.quiet[0] if row and row.quiet else {}
+        form = {f"quiet-{name}": quiet.get(name, "") for name in ("begins", "ends")}
+        form |= {"address": row.address if row else ""}
+    return page(
+        request,
+        "access/notifications.html",
+        status=error.status if error else 200,
+        row=row,
+        form=form,
+        errors=by_field(error) if error else {},
+        problem=error if error and not error.errors else None,
+        done=done,
+    )

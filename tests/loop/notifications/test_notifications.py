@@ -1,0 +1,535 @@
+"""Notifications end to end: real PostgreSQL, a mail server, a web server that hangs, redirects and answers 500."""
+
+import socket
+import ssl
+import sys
+from collections.abc import Iterator
+from datetime import UTC, datetime, timedelta
+from functools import partial
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+import pytest
+from sqlalchemy import text
+
+from app.db.engine import Database
+from app.loop.notifications import means, notifier, sending
+from app.loop.notifications.addresses import Refused, place_of
+from app.loop.notifications.means import Answer, Job, Message, deliver
+from app.loop.notifications.schemas import RouteIn
+from app.loop.notifications.tables import NotificationRoute, Receiver
+from app.settings import Settings
+from tests.conftest import NewDatabase, drop_database
+from tests.in_process import InProcess, in_process
+from tests.loop.notifications.sinks import Hooks, Mails, certificate, mail_server, secure, web_server
+from tests.loops import run
+from tests.shop import Shop, unique
+from tests.waits import until
+
+NETWORKS: dict[str, Any] = {"webhook_networks": "127.0.0.0/8"}
+
+
+@pytest.fixture(scope="module")
+def hooks() -> Iterator[Hooks]:
+    with web_server() as made:
+        yield made
+
+
+@pytest.fixture(scope="module")
+def mails() -> Iterator[tuple[Mails, str]]:
+    with mail_server() as made:
+        yield made
+
+
+@pytest.fixture(scope="module")
+def plant(new_database: NewDatabase, hooks: Hooks, mails: tuple[Mails, str]) -> Iterator[InProcess]:
+    """The whole application, which looks twenty times a second, and waits for nobody longer than a second."""
+    url = new_database()
+    settings: dict[str, Any] = {
+        "mail_server": mails[1],
+        "mail_security": "none",
+        "public_url": "https://inband.test",
+    } | NETWORKS
+    with pytest.MonkeyPatch.context() as quick:
+        quick.setattr(notifier, "EVERY", 0.05)
+        quick.setattr(means, "LIMIT", 1.0)
+        with in_process(url, **settings) as running:
+            yield running
+    drop_database(url)
+
+
+@pytest.fixture
+def shop(plant: InProcess) -> Shop:
+    return Shop(plant)
+
+
+def receiver(shop: Shop, address: str, kind: str = "webhook", **more: Any) -> Any:
+    return shop.call("POST", "/notifications/receivers", 201, name=unique("andon"), means=kind, address=address, **more)
+
+
+def route(shop: Shop, *steps: tuple[int, Any], **more: Any) -> Any:
+    """A route of this machine's alarms: after so many minutes to this receiver."""
+    made = [{"after": after, "receivers": [to["id"]]} for after, to in steps]
+    rule = {"name": unique("route"), "machines": [shop.machine], "steps": made}
+    return shop.call("POST", "/notifications/routes", 201, **rule | more)
+
+
+def deliveries(shop: Shop, to: Any, state: str | None = None) -> list[Any]:
+    found = shop.call("GET", f"/notifications/deliveries?receiver={to['id']}")["items"]
+    return [each for each in found if state in (None, each["state"])]
+
+
+def later(shop: Shop, to: Any, minutes: float = 1) -> None:
+    """Let so much time pass for a receiver."""
+    columns = ("last_at", "retry_at", "busy_until", "away_until")
+    moved = ", ".join(f"{each} = {each} - :by" for each in columns)
+    with shop.server.database.begin() as session:
+        by = {"by": timedelta(minutes=minutes), "id": to["id"]}
+        session.execute(text(f"UPDATE receiver SET {moved} WHERE id = :id"), by)  # noqa: S608 - names of this file
+        session.execute(text("UPDATE announced SET at = at - :by WHERE receiver_id = :id"), by)
+
+
+def flood(shop: Shop, number: int) -> None:
+    """So many alarms at once, each about another tool."""
+    with shop.server.database.begin() as session:
+        session.execute(
+            text(
+                "INSERT INTO alarm (machine_id, tool_memory, kind)"
+                " SELECT id, n, 'hunting' FROM machine, generate_series(1, :number) n WHERE key = :key"
+            ),
+            {"number": number, "key": shop.machine},
+        )
+
+
+class TestMail:
+    def test_an_alarm_is_mailed_with_its_words_and_its_link(self, shop: Shop, mails: tuple[Mails, str]) -> None:
+        address = f"{unique('anna')}@example.com"
+        anna = receiver(shop, address, "mail")
+        route(shop, (0, anna))
+        shop.read(350)
+        (mail,) = until(lambda: mails[0].to(address))
+        (alarm,) = shop.call("GET", f"/alarms?machine={shop.machine}")["items"]
+        assert mail.startswith(f"Tool worn: Lathe {shop.machine[6:]}, Seat {shop.characteristic}, tool 3\n")
+        for words in (alarm["text"], alarm["what_to_do"], f"https://inband.test/alarms/{alarm['id']}"):
+            assert words in mail
+        (done,) = until(lambda: deliveries(shop, anna, "delivered"))
+        assert done["alarms"] == [alarm["id"]]
+        assert done["answer"] == "The mail server has taken it."
+
+    def test_it_is_repeated_until_somebody_acknowledges_it(self, shop: Shop, mails: tuple[Mails, str]) -> None:
+        address = f"{unique('ben')}@example.com"
+        ben = receiver(shop, address, "mail")
+        route(shop, (0, ben), repeat=5)
+        shop.read(350)
+        until(lambda: deliveries(shop, ben, "delivered"))
+        later(shop, ben, 5)
+        assert until(lambda: mails[0].to(address)[1:])[0].startswith("Reminder: Tool worn")
+        until(lambda: len(deliveries(shop, ben, "delivered")) == 2)
+        (alarm,) = shop.call("GET", f"/alarms?machine={shop.machine}")["items"]
+        shop.call("POST", f"/alarms/{alarm['id']}/acknowledge", action="noted", comment="Seen")
+        later(shop, ben, 60)
+        shop.read(20)  # another alarm, which alone is in the next message
+        assert until(lambda: mails[0].to(address)[2:])[0].startswith("Oversize")
+
+    def test_a_flood_is_one_message_with_the_count(self, shop: Shop, mails: tuple[Mails, str]) -> None:
+        address = f"{unique('cleo')}@example.com"
+        cleo = receiver(shop, address, "mail")
+        route(shop, (0, cleo))
+        flood(shop, 300)
+        (mail,) = until(lambda: mails[0].to(address))
+        assert mail.startswith("300 alarms\n")
+        assert mail.count("https://inband.test/alarms/") == 20
+        assert "… and 280 more: https://inband.test/alarms" in mail
+        until(lambda: deliveries(shop, cleo, "delivered"))
+        shop.read(350)
+        later(shop, cleo)
+        assert until(lambda: mails[0].to(address)[1:])[0].startswith("Tool worn")
+
+    def test_a_test_can_be_sent(self, shop: Shop, mails: tuple[Mails, str]) -> None:
+        address = f"{unique('eve')}@example.com"
+        eve = receiver(shop, address, "mail", away_until=(datetime.now(UTC) + timedelta(days=9)).isoformat())
+        asked = shop.call("POST", f"/notifications/receivers/{eve['id']}/test", 202)
+        assert (asked["about"], asked["state"]) == ("test", "waiting")
+        until(lambda: shop.call("GET", f"/notifications/deliveries/{asked['id']}")["state"] == "delivered")
+        assert "Notifications arrive here." in mails[0].to(address)[0]
+
+
+class TestWebhook:
+    def test_it_is_signed(self, shop: Shop, hooks: Hooks) -> None:
+        path = f"/{unique('hook')}"
+        andon = receiver(shop, hooks.url + path)
+        route(shop, (0, andon))
+        shop.read(350)
+        until(lambda: hooks.at(path))
+        (post,) = [post for post in hooks.posts if post.path == path]
+        assert post.signed_with(andon["secret"])
+        assert not post.signed_with("another secret")
+        assert abs(int(post.headers["x-inband-timestamp"]) - datetime.now(UTC).timestamp()) < 60
+        (alarm,) = post.json["alarms"]
+        assert (alarm["kind"], alarm["machine"], alarm["tool"]) == ("tool_worn", shop.machine, 3)
+        assert (post.json["type"], post.json["count"], post.json["reminder"]) == ("alarms", 1, False)
+        assert "secret" not in shop.call("GET", f"/notifications/receivers/{andon['id']}")
+
+    @pytest.mark.parametrize(
+        ("way", "answer"),
+        [("500", "500 Internal Server Error"), ("302", "302 leads to another"), ("hang", "no answer within 1 s")],
+    )
+    def test_where_it_fails_the_next_step_follows_at_once(
+        self, shop: Shop, hooks: Hooks, mails: tuple[Mails, str], way: str, answer: str
+    ) -> None:
+        path, address = f"/{unique('hook')}-{way}", f"{unique('fay')}@example.com"
+        broken, fay = receiver(shop, hooks.url + path), receiver(shop, address, "mail")
+        route(shop, (0, broken), (30, fay))
+        shop.read(350)
+        (mail,) = until(lambda: mails[0].to(address))
+        assert mail.startswith("Tool worn")
+        failed = deliveries(shop, broken)[-1]
+        assert failed["state"] == "failed"
+        assert failed["answer"].startswith(answer)
+        assert hooks.at(path.removesuffix("-302")) == [] or way != "302"
+        now = shop.call("GET", f"/notifications/receivers/{broken['id']}")
+        assert now["failures"] >= 1
+        assert now["retry_at"] is not None
+        hooks.mended.add(path)
+        later(shop, broken, 10)
+        until(lambda: deliveries(shop, broken, "delivered"))
+        assert shop.call("GET", f"/notifications/receivers/{broken['id']}")["failures"] == 0
+
+    def test_one_that_hangs_keeps_nobody_waiting(self, shop: Shop, hooks: Hooks) -> None:
+        stuck = [receiver(shop, f"{hooks.url}/{unique('hook')}-hang") for _each in range(3)]
+        path = f"/{unique('hook')}"
+        fine = receiver(shop, hooks.url + path)
+        route(shop, *((0, each) for each in (*stuck, fine)))
+        shop.read(350)
+        until(lambda: deliveries(shop, fine, "delivered"))
+        assert shop.read(1)["sequence"] == 2
+
+    def test_changes_come_in_order_and_none_is_lost(self, shop: Shop, hooks: Hooks) -> None:
+        path = f"/{unique('mes')}-500"
+        mes = receiver(shop, hooks.url + path, events=["reading", "correction", "alarm", "tool"])
+        shop.read(6)
+        until(lambda: deliveries(shop, mes, "failed"))
+        shop.read(350)
+        hooks.mended.add(path)
+        later(shop, mes, 10)
+        got = until(lambda: hooks.at(path))[0]["changes"]
+        mine = [(each["kind"], each.get("sequence")) for each in got if each["machine"] == shop.machine]
+        assert mine[0] == ("reading", 1)
+        assert ("reading", 2) in mine
+        assert {"correction", "alarm"} <= {kind for kind, _sequence in mine}
+        numbers = [each["event"] for each in got]
+        assert numbers == sorted(numbers)
+        (first,) = [each for each in got if each.get("sequence") == 1 and each["machine"] == shop.machine]
+        assert first["link"].endswith(f"/api/v1/readings/{shop.characteristic}/1")
+        until(lambda: deliveries(shop, mes, "delivered"))
+        shop.read(1)
+        again = until(lambda: hooks.at(path)[1:])[0]["changes"]
+        assert min(each["event"] for each in again) > max(numbers)
+
+
+def test_a_dead_mail_server_disturbs_nothing(new_database: NewDatabase, hooks: Hooks, monkeypatch: Any) -> None:
+    monkeypatch.setattr(notifier, "EVERY", 0.05)
+    with socket.socket() as nobody:
+        nobody.bind(("127.0.0.1", 0))  # and does not listen
+        url = new_database()
+        with in_process(url, mail_server=f"127.0.0.1:{nobody.getsockname()[1]}", **NETWORKS) as running:
+            shop = Shop(running)
+            path = f"/{unique('hook')}"
+            mail, andon = receiver(shop, "anna@example.com", "mail"), receiver(shop, hooks.url + path)
+            route(shop, (0, mail), (0, andon))
+            shop.read(350)
+            until(lambda: deliveries(shop, andon, "delivered"))
+            failed = until(lambda: deliveries(shop, mail, "failed"))[0]
+            assert "ConnectionRefusedError" in failed["answer"]
+            assert shop.read(1)["sequence"] == 2
+    drop_database(url)
+
+
+# --- one step of it at a time
+
+
+def machine(session: Any) -> int:
+    return session.scalar(text("INSERT INTO machine (key, name, control) VALUES ('m', 'M', 'other') RETURNING id")) or 0
+
+
+def raise_alarm(session: Any, kind: str = "offset_limit") -> None:
+    session.execute(
+        text("INSERT INTO alarm (machine_id, tool_memory, kind) SELECT id, 1, :kind FROM machine"), {"kind": kind}
+    )
+
+
+@pytest.fixture
+def routed(database: Database) -> Database:
+    """A machine, a receiver and a route."""
+    with database.begin() as session:
+        machine(session)
+        session.add(Receiver(name="Anna", means="mail", address="anna@example.com", created_by="tests"))
+        session.flush()
+        number = session.scalar(text("SELECT id FROM receiver"))
+        rule = RouteIn(name="All", steps=[{"receivers": [number]}])  # type: ignore[list-item]
+        stored = rule.model_dump(mode="json", exclude={"name", "enabled"})
+        session.add(NotificationRoute(name="All", rule=stored, created_by="tests"))
+    return database
+
+
+def planned(database: Database) -> list[Job]:
+    with database.begin() as session:
+        return sending.plan(session, "http://inband.test", frozenset())
+
+
+def test_nothing_is_announced_before_it_is_committed(routed: Database) -> None:
+    with routed.begin() as session:
+        raise_alarm(session)
+        assert planned(routed) == []
+    (job,) = planned(routed)
+    assert job.message.subject == "Offset limit: M, tool 1"
+
+
+def test_an_alarm_that_cannot_be_worded_keeps_no_other_waiting(routed: Database) -> None:
+    with routed.begin() as session:
+        raise_alarm(session, "hunting")  # without the numbers that its sentence names
+        raise_alarm(session)
+    (job,) = planned(routed)
+    assert job.message.subject == "2 alarms"
+
+
+def test_one_process_plans_at_a_time_and_what_it_has_begun_is_its_own(routed: Database) -> None:
+    with routed.begin() as session:
+        raise_alarm(session)
+    with routed.begin() as session:
+        assert len(sending.plan(session, "", frozenset())) == 1
+        assert planned(routed) == []
+    assert planned(routed) == []
+
+
+def test_what_a_server_has_left_behind_is_sent_again(routed: Database) -> None:
+    with routed.begin() as session:
+        raise_alarm(session)
+    (left,) = planned(routed)
+    with routed.begin() as session:
+        session.execute(text("UPDATE receiver SET busy_until = now()"))
+        session.execute(text("UPDATE delivery SET asked_at = now() - interval '1 hour'"))
+    (again,) = planned(routed)
+    assert again.delivery > left.delivery
+    assert again.alarms == left.alarms
+    with routed.begin() as session:
+        states = session.scalars(text("SELECT state FROM delivery ORDER BY id")).all()
+        assert states == ["lost", "sending"]
+        sending.end(session, again, Answer(delivered=True, text="250"))
+    assert planned(routed) == []
+
+
+def test_somebody_whose_access_has_ended_gets_nothing(routed: Database) -> None:
+    with routed.begin() as session:
+        raise_alarm(session)
+        session.execute(
+            text(
+                "WITH p AS (INSERT INTO person (name, role, password_hash, disabled_at)"
+                " VALUES ('Anna', 'viewer', '', now()) RETURNING id) UPDATE receiver SET person_id = p.id FROM p"
+            )
+        )
+    assert planned(routed) == []
+
+
+def test_what_is_old_is_forgotten(routed: Database) -> None:
+    with routed.begin() as session:
+        raise_alarm(session)
+    (job,) = planned(routed)
+    with routed.begin() as session:
+        sending.end(session, job, Answer(delivered=True, text="250"))
+    with routed.begin() as session:
+        session.execute(text("UPDATE delivery SET asked_at = now() - interval '32 days'"))
+        session.execute(text("UPDATE announced SET at = now() - interval '32 days'"))
+        sending.forget_old(session)
+        assert session.scalar(text("SELECT count(*) FROM delivery")) == 0
+        assert session.scalar(text("SELECT count(*) FROM announced")) == 1, "the alarm is still active"
+        acknowledged = "acknowledged_at = now(), acknowledged_by = 'anna', action = 'noted', comment = 'Seen'"
+        session.execute(text(f"UPDATE alarm SET {acknowledged}"))  # noqa: S608 - words of this file
+        sending.forget_old(session)
+        assert session.scalar(text("SELECT count(*) FROM announced")) == 0
+
+
+# --- where messages may go
+
+
+def found(monkeypatch: pytest.MonkeyPatch, *addresses: str) -> None:
+    """Let the name service answer this."""
+
+    def answers(_host: str, port: int, **_more: Any) -> list[Any]:
+        return [(socket.AF_INET6 if ":" in each else socket.AF_INET, 1, 6, "", (each, port)) for each in addresses]
+
+    monkeypatch.setattr("app.loop.notifications.addresses.socket.getaddrinfo", answers)
+
+
+PUBLIC = "93.184.215.14"
+
+
+@pytest.mark.parametrize(
+    "inside",
+    ["127.0.0.1", "10.1.2.3", "169.254.169.254", "::1", "::ffff:10.0.0.1", "64:ff9b::a00:1", "2002:a00:1::", "fd00::1",
+     "0.0.0.0", "224.0.0.1"],
+)  # fmt: skip
+def test_addresses_inside_the_network_are_refused_unless_permitted(
+    monkeypatch: pytest.MonkeyPatch, inside: str
+) -> None:
+    found(monkeypatch, PUBLIC, inside)
+    with pytest.raises(Refused, match="INBAND_WEBHOOK_NETWORKS"):
+        place_of("https://andon.example/x", Settings())
+
+
+def test_public_addresses_need_https(monkeypatch: pytest.MonkeyPatch) -> None:
+    found(monkeypatch, PUBLIC)
+    with pytest.raises(Refused, match="https"):
+        place_of("http://andon.example/x", Settings())
+    assert str(place_of("https://andon.example/x", Settings()).address) == PUBLIC
+    permitted = Settings(webhook_networks="93.184.0.0/16")
+    assert place_of("http://andon.example/x", permitted).port == 80
+
+
+def webhook(url: str) -> Job:
+    return Job(1, 1, "test", "webhook", url, "secret", Message("Test", "", {"type": "test"}))
+
+
+def test_the_address_that_was_checked_is_the_one_connected_to(monkeypatch: pytest.MonkeyPatch, hooks: Hooks) -> None:
+    found(monkeypatch, "127.0.0.1")  # only that look is answered; the connection asks nobody
+    path = f"/{unique('hook')}"
+    url = f"http://no-such-name.invalid:{hooks.server_port}{path}"
+    answer = run(deliver(webhook(url), Settings(**NETWORKS)))
+    assert answer == Answer(delivered=True, text="204 No Content")
+    (post,) = [post for post in hooks.posts if post.path == path]
+    assert post.headers["host"] == f"no-such-name.invalid:{hooks.server_port}"
+
+
+def test_webhooks_do_not_lead_to_a_server_that_only_listens_inside(hooks: Hooks) -> None:
+    answer = run(deliver(webhook(f"{hooks.url}/secret"), Settings()))
+    assert not answer.delivered
+    assert "INBAND_WEBHOOK_NETWORKS" in answer.text
+    assert hooks.at("/secret") == []
+
+
+def mail(server: str, **settings: Any) -> Answer:
+    job = Job(1, 1, "test", "mail", "anna@example.com", None, Message("Tool\r\nworn", "Text\n"))
+    return run(deliver(job, Settings(mail_server=server, **settings)))
+
+
+class TestEncryption:
+    def test_a_mail_server_without_it_gets_nothing(self, mails: tuple[Mails, str]) -> None:
+        before = len(mails[0].mails)
+        answer = mail(mails[1])
+        assert not answer.delivered
+        assert "STARTTLS" in answer.text
+        assert len(mails[0].mails) == before
+
+    def test_its_certificate_has_to_be_known(self, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+        pem = certificate(tmp_path)
+        with mail_server(secure(pem)) as (sink, server):
+            refused = mail(server)
+            assert "CERTIFICATE_VERIFY_FAILED" in refused.text
+            assert sink.mails == []
+            monkeypatch.setattr(means, "_tls", partial(ssl.create_default_context, cafile=str(pem)))
+            assert mail(server).delivered
+        assert sink.encrypted == [True]
+        assert sink.mails[0]["Subject"] == "Tool worn"
+
+    def test_without_a_mail_server_it_says_what_to_set(self) -> None:
+        job = Job(1, 1, "test", "mail", "anna@example.com", None, Message("Test", "Text\n"))
+        assert "INBAND_MAIL_SERVER" in run(deliver(job, Settings())).text
+
+
+# --- setting it up
+
+
+class TestSetUp:
+    def test_who_may(self, plant: InProcess, shop: Shop) -> None:
+        engineer = plant.client(plant.key("engineer"))
+        for path in ("routes", "receivers", "deliveries"):
+            shop.call("GET", f"/notifications/{path}", 403, client=engineer)
+        shop.call("PUT", "/notifications/me", 403, address="key@example.com")  # a key is no person
+
+    def test_names_that_nothing_has_are_refused(self, shop: Shop) -> None:
+        body: dict[str, Any] = {
+            "name": "Night",
+            "kinds": ["tool_worm"],
+            "machines": ["mill-99"],
+            "characteristics": ["none"],
+        }
+        answer = shop.call("POST", "/notifications/routes", 422, **body, steps=[{"receivers": [99999]}])
+        assert [each["field"] for each in answer["errors"]] == ["kinds", "machines", "characteristics", "steps"]
+        steps = [{"after": 5, "receivers": [1]}, {"after": 1, "receivers": [1]}]
+        answer = shop.call("POST", "/notifications/routes", 422, name="Night", steps=steps)
+        assert answer["errors"][0]["field"] == "steps"
+
+    @pytest.mark.parametrize(
+        ("means", "address"),
+        [
+            ("mail", "anna"),
+            ("mail", "anna@example.com\nBcc: all@example.com"),
+            ("mail", "Anna <anna@example.com>"),
+            ("webhook", "file:///etc/passwd"),
+            ("webhook", "https://user:password@andon.example"),
+            ("webhook", "https://[::1"),
+            ("webhook", "https://andon.example:99999/"),
+            ("webhook", "https://andon.example/a b"),
+            ("apprise", "ntfy://topic"),
+        ],
+    )
+    def test_addresses_that_cannot_be_are_refused(self, shop: Shop, means: str, address: str) -> None:
+        body: dict[str, Any] = {"name": "X", "means": means, "address": address}
+        assert shop.call("POST", "/notifications/receivers", 422, **body)["errors"][0]["field"] == "address"
+
+    def test_a_route_is_changed_and_deleted(self, shop: Shop, hooks: Hooks) -> None:
+        andon = receiver(shop, f"{hooks.url}/x")
+        made = route(shop, (0, andon))
+        path = f"/notifications/routes/{made['id']}"
+        got = shop.admin.get(f"/api/v1{path}")
+        assert got.json() == made
+        night = {"days": [1, 2, 3, 4, 5], "begins": "22:00", "ends": "06:00"}
+        body = {"name": "Night", "hours": [night], "steps": made["steps"], "enabled": False}
+        tag = {"If-Match": got.headers["ETag"]}
+        assert shop.admin.put(f"/api/v1{path}", json=body, headers=tag).json()["hours"] == [night]
+        assert shop.admin.put(f"/api/v1{path}", json=body, headers=tag).status_code == 412
+        shop.call("DELETE", f"/notifications/receivers/{andon['id']}", 409)
+        shop.call("DELETE", path, 204)
+        shop.call("DELETE", f"/notifications/receivers/{andon['id']}", 204)
+        shop.call("GET", path, 404)
+
+    def test_the_record_of_changes_holds_no_address_and_no_secret(self, shop: Shop) -> None:
+        address = f"{unique('grace')}@example.com"
+        grace = receiver(shop, address, "mail")
+        path = f"/notifications/receivers/{grace['id']}"
+        shop.call("PATCH", path, name="Grace", address=f"new-{address}")
+        assert shop.call("GET", path)["address"] == f"new-{address}"
+        shop.call("PATCH", path, 422, events=["alarm"])
+        entries = shop.call("GET", f"/audit?subject=receiver/{grace['id']}")["items"]
+        assert {each["action"] for each in entries} == {"receiver added", "receiver changed"}
+        assert address not in str(entries)
+
+
+class TestApprise:
+    PERMITTED = Settings(allow_apprise=True)
+
+    def test_where_it_is_missing_it_says_how_to_install_it(self, monkeypatch: pytest.MonkeyPatch) -> None:
+        monkeypatch.setitem(sys.modules, "apprise", None)
+        job = Job(1, 1, "test", "apprise", "ntfy://topic", None, Message("Test", "Text"))
+        assert "pip install inband[notify]" in run(deliver(job, self.PERMITTED)).text
+
+    def test_it_is_given_the_message(self, monkeypatch: pytest.MonkeyPatch) -> None:
+        sent: list[Any] = []
+
+        class Apprise:
+            def add(self, url: str) -> bool:
+                sent.append(url)
+                return True
+
+            def notify(self, **message: str) -> bool:
+                sent.append(message)
+                return True
+
+        module = ModuleType("apprise")
+        module.Apprise = Apprise  # type: ignore[attr-defined]
+        monkeypatch.setitem(sys.modules, "apprise", module)
+        job = Job(1, 1, "test", "apprise", "ntfy://topic", None, Message("Tool worn", "Text"))
+        assert run(deliver(job, self.PERMITTED)).delivered
+        assert sent == ["ntfy://topic", {"title": "Tool worn", "body": "Text"}]
+        assert not run(deliver(job, Settings())).delivered

@@ -1,0 +1,131 @@
+"""The pages of notifications, as an administrator works them, and everybody their own."""
+
+import re
+from typing import Any
+
+import pytest
+from playwright.sync_api import Page, expect
+
+from tests.conftest import Server
+from tests.shop import Person, Shop, unique
+
+
+@pytest.fixture(scope="module")
+def admin(server: Server) -> Person:
+    return Person(server, "admin")
+
+
+def receiver_named(shop: Shop, name: str) -> Any:
+    items = shop.call("GET", "/notifications/receivers?limit=1000")["items"]
+    return next((each for each in items if each["name"] == name), None)
+
+
+def added(shop: Shop, admin: Person, **more: str) -> Any:
+    name = unique("Anna")
+    fields: dict[str, Any] = {
+        "name": name,
+        "means": "mail",
+        "address": "anna@example.com",
+        "quiet-begins": "",
+        "quiet-ends": "",
+    }
+    admin.send("/setup/notifications/receivers", **fields | more)
+    return receiver_named(shop, name)
+
+
+def test_a_receiver_is_added_tested_and_its_delivery_is_seen(shop: Shop, admin: Person, page: Page) -> None:
+    name = unique("Anna")
+    admin.sign_in(page)
+    page.goto("/setup/notifications")
+    page.get_by_label("Name", exact=True).fill(name)
+    page.get_by_label("Address", exact=True).fill("anna@example.com")
+    page.get_by_role("button", name="Add receiver").click()
+    expect(page.get_by_role("status").filter(has_text="Added.")).to_be_visible()
+    row = page.locator("#receivers tr").filter(has_text=name)
+    row.get_by_role("button", name="Send a test").click()
+    expect(page.get_by_role("status").filter(has_text="A test is sent within seconds")).to_be_visible()
+    delivery = page.locator("#delivery-list tr").filter(has_text=name)
+    expect(delivery).to_contain_text("INBAND_MAIL_SERVER")  # of this server, which has none; it comes by itself
+    expect(row).to_contain_text("1 failure")
+
+
+def test_a_route_is_made_changed_and_deleted(shop: Shop, admin: Person) -> None:
+    anna, name = added(shop, admin), unique("Night")
+    step: dict[str, Any] = {f"step-1-{anna['id']}": "true", "after-1": "0"}
+    fields: dict[str, Any] = {
+        "name": name,
+        "enabled": "true",
+        "kind-tool_worn": "true",
+        "tone-stop": "true",
+        "machines": f" {shop.machine}, ",
+        "hours-begins": "22:00",
+        "hours-ends": "06:00",
+        "day-1": "true",
+        "day-2": "true",
+        "repeat": "10",
+        "hold_off": "5",
+        "digest": "",
+    }
+    text = admin.send("/setup/notifications/routes/new", 422, **fields)
+    assert "steps" in text or "Is missing" in text or "at least" in text.lower()
+    text = admin.send("/setup/notifications/routes/new", **fields | step)
+    assert name in text
+    assert "Mon, Tue 22:00–06:00" in text
+    (made,) = [each for each in shop.call("GET", "/notifications/routes?limit=1000")["items"] if each["name"] == name]
+    assert made["hours"] == [{"days": [1, 2], "begins": "22:00", "ends": "06:00"}]
+    assert (made["machines"], made["kinds"], made["tones"]) == ([shop.machine], ["tool_worn"], ["stop"])
+    assert (made["on_days_off"], made["repeat"], made["digest"]) == (False, 10, 0)
+    path = f"/setup/notifications/routes/{made['id']}"
+    form = admin.open(path)
+    ticked = re.findall(r'name="([\w-]+)" value="true" checked', form)
+    assert set(ticked) == {"enabled", "kind-tool_worn", "tone-stop", "day-1", "day-2", f"step-1-{anna['id']}"}
+    assert "names this receiver" in admin.send(f"/setup/notifications/receivers/{anna['id']}/delete", 409)
+    assert "there is no machine" in admin.send(path, 422, **fields | step | {"machines": "nowhere"}).lower()
+    admin.send(path, **fields | step | {"repeat": "20"})
+    assert shop.call("GET", f"/notifications/routes/{made['id']}")["repeat"] == 20
+    admin.send(path, do="delete")
+    shop.call("GET", f"/notifications/routes/{made['id']}", 404)
+    admin.send(f"/setup/notifications/receivers/{anna['id']}/delete")
+    assert receiver_named(shop, anna["name"]) is None
+
+
+def test_a_route_that_the_form_cannot_hold_is_not_shortened_by_it(shop: Shop, admin: Person) -> None:
+    anna = added(shop, admin)
+    steps = [{"after": minutes, "receivers": [anna["id"]]} for minutes in range(5)]
+    body: dict[str, Any] = {"name": unique("Long"), "machines": [shop.machine], "steps": steps}
+    made = shop.call("POST", "/notifications/routes", 201, **body)
+    path = f"/setup/notifications/routes/{made['id']}"
+    assert "Change it by REST" in admin.open(path)
+    step: dict[str, Any] = {f"step-1-{anna['id']}": "true"}
+    admin.send(path, 409, name="Short", **step)
+    assert shop.call("GET", f"/notifications/routes/{made['id']}")["steps"] == steps
+
+
+def test_the_secret_of_a_webhook_is_shown_once(shop: Shop, admin: Person) -> None:
+    name = unique("Andon")
+    fields: dict[str, Any] = {
+        "name": name,
+        "means": "webhook",
+        "address": "https://andon.example/x",
+        "events-tool": "true",
+    }
+    text = admin.send("/setup/notifications/receivers", **fields)
+    (secret,) = re.findall(r'<p class="secret"><code>([\w-]{43})</code>', text)
+    assert secret not in admin.open("/setup/notifications")
+    assert receiver_named(shop, name)["events"] == ["tool"]
+    bad = admin.send("/setup/notifications/receivers", 422, **fields | {"address": "ftp://andon"})
+    assert "Must be an address such as https://" in bad
+
+
+def test_everybody_says_where_they_get_mail(shop: Shop, server: Server) -> None:
+    viewer = Person(server, "viewer")
+    viewer.open("/setup/notifications", 403)
+    fields: dict[str, Any] = {"address": f"{viewer.name}@example.com", "quiet-begins": "20:00", "quiet-ends": "06:00"}
+    assert "Saved." in viewer.send("/account/notifications", **fields)
+    mine = viewer.browser.get("/api/v1/notifications/me").json()
+    assert mine["quiet"] == [{"days": [1, 2, 3, 4, 5, 6, 7], "begins": "20:00", "ends": "06:00"}]
+    assert receiver_named(shop, viewer.name)["person"] == mine["person"]
+    assert "Must be one mail address" in viewer.send("/account/notifications", 422, **fields | {"address": "anna"})
+    viewer.send("/account/notifications", do="delete")
+    assert receiver_named(shop, viewer.name) is None
+    assert viewer.browser.get("/api/v1/notifications/me").status_code == 404
