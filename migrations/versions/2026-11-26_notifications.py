@@ -2,8 +2,8 @@
 
 `downgrade` loses them; the record of changes keeps who set them up.
 
-Revision ID: 0117
-Revises: 0116
+Revision ID: 0118
+Revises: 0117
 Create Date: 2026-11-26
 """
 

@@ -219,10 +219,10 @@ class TestInTheBrowser:
         page.goto(path(shop))
         expect(page.locator("plotly-chart.zones")).to_have_attribute("tabindex", "0")
         box = f"{PLOT}.getBoundingClientRect()"
-        eventually(page, f"{box}.bottom <= innerHeight && {box}.width > 1200", 60)
+        eventually(page, f"{box}.bottom <= innerHeight && {box}.width > 1200")
         shop.read(1500.0)  # a probe fault: compensation is paused
         expect(page.locator("#now")).to_contain_text("Compensation is paused")
-        eventually(page, f"{box}.bottom <= innerHeight", 60)
+        eventually(page, f"{box}.bottom <= innerHeight")
 
     def test_a_click_on_a_point_shows_its_reading_and_the_link_opens_it(
         self, shop: Shop, viewer: Person, page: Page
