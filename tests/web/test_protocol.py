@@ -13,6 +13,7 @@ from typing import Any
 import httpx
 import pytest
 import uvicorn
+from starlette.requests import Request
 
 from app.web import protocol
 from app.web.protocol import MOST_HEAD, ServerProtocol
@@ -53,6 +54,8 @@ async def application(scope: dict[str, Any], receive: Any, send: Any) -> None:
         held.count += 1
         while not held.answered.is_set():  # noqa: ASYNC110 - set by another thread
             await asyncio.sleep(0.01)
+    if scope["path"] == "/cookies":
+        body = b"x" * len(Request(scope).cookies["b"])
     await send({"type": "http.response.start", "status": 200, "headers": []})
     await send({"type": "http.response.body", "body": str(len(body)).encode()})
 
@@ -110,6 +113,16 @@ def test_a_head_of_the_usual_size_is_served(port: int) -> None:
     long = {"Long": "a" * (MOST_HEAD // 2)}
     answer = httpx.post(f"http://127.0.0.1:{port}/", headers=long, content=b"x" * 300_000, timeout=60, verify=TLS)
     assert answer.text == "300000"
+
+
+@pytest.mark.parametrize("sign", ["\\", "\\1", "\\\\", '\\"'])
+def test_a_cookie_of_backslashes_holds_up_nobody(port: int, sign: str) -> None:
+    """Read for whoever asks for anything; 64 kB of them took ten seconds of the event loop."""
+    cookie = {"Cookie": f'b=1; a="{sign * (MOST_HEAD * 3 // 4 // len(sign))}"'}
+    begun = time.monotonic()
+    answer = httpx.get(f"http://127.0.0.1:{port}/cookies", headers=cookie, timeout=60, verify=TLS)
+    assert answer.status_code == 200
+    assert time.monotonic() - begun < 3
 
 
 def test_whoever_says_nothing_is_let_go(port: int) -> None:
