@@ -28,6 +28,8 @@ class Pipeline:
         """distributed: the tables may lie on another node (`app.db.citus`), where nobody listens for notifications."""
         self.connection = connection
         self.distributed = distributed
+        self.begin: tuple[Step, ...] = (("BEGIN",),)
+        """By which transactions begin that say so."""
         self.until: float | None = None
         """By the clock of the event loop: when waiting for an answer ends. None: as long as the database is heard."""
         self._prepared: dict[str, bytes] = {}

@@ -4,6 +4,7 @@ Run where `INBAND_TEST_CITUS` names the folder of PostgreSQL's programs with the
 """
 
 import threading
+import time
 from collections.abc import Iterator
 from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import closing, contextmanager
@@ -96,10 +97,7 @@ def under_load(server: Server, client: httpx.Client, coordinator: str, run: str)
     senders = []
     for number in range(4):
         machine, name = f"{run}-{number}", f"{run}-{number}-seat"
-        body: dict[str, Any] = {"key": machine, "name": "Lathe", "control": "other"}
-        assert client.post("/api/v1/machines", json=body).status_code == 201
-        body = {"key": name, "name": "Seat", "machine": machine, "parameters": PARAMETERS}
-        assert client.post("/api/v1/characteristics", json=body).status_code == 201
+        assert seat_of(client, machine) == name
         secret = key_of(coordinator, "far", machine=machine)
         readings = scattered(name, 1_000_000, number)
         senders.append(Sender(f"{server.url}/p/far", secret, readings, patience=120, pause=0.01))
@@ -132,8 +130,17 @@ def answered(senders: list[Sender], working: Future[Any]) -> None:
     )
 
 
-def push(client: httpx.Client, micrometres: float) -> int:
-    body = {"characteristic": "shaft", "measured": round(40 + micrometres / 1000, 6)}
+def seat_of(client: httpx.Client, machine: str) -> str:
+    """Set up a machine and its characteristic, which has no reading yet."""
+    body: dict[str, Any] = {"key": machine, "name": "Lathe", "control": "other"}
+    assert client.post("/api/v1/machines", json=body).status_code == 201
+    body = {"key": f"{machine}-seat", "name": "Seat", "machine": machine, "parameters": PARAMETERS}
+    assert client.post("/api/v1/characteristics", json=body).status_code == 201
+    return f"{machine}-seat"
+
+
+def push(client: httpx.Client, micrometres: float, characteristic: str = "shaft") -> int:
+    body = {"characteristic": characteristic, "measured": round(40 + micrometres / 1000, 6)}
     answer = client.post("/api/v1/readings", json=body)
     assert answer.status_code == 201, answer.text
     return int(answer.json()["sequence"])
@@ -143,12 +150,17 @@ def push(client: httpx.Client, micrometres: float) -> int:
 @pytest.mark.long
 class TestPlantOnANode:
     def test_readings_are_decided_and_summarised_there(self, client: httpx.Client, coordinator: str) -> None:
-        assert [push(client, number % 7) for number in range(140)] == list(range(1, 141))
-        batch = [{"characteristic": "shaft", "measured": 40.002, "key": f"k{number}"} for number in range(100)]
+        seat = seat_of(client, "counted")
+        assert [push(client, number % 7, seat) for number in range(140)] == list(range(1, 141))
+        batch = [{"characteristic": seat, "measured": 40.002, "key": f"k{number}"} for number in range(100)]
         assert client.post("/api/v1/readings/batch", json=batch).status_code in {200, 201}
+        with psycopg.connect(in_schema(coordinator, "far")) as connection:
+            (of_seat,) = connection.execute("SELECT id FROM characteristic WHERE key = %s", (seat,)).fetchone() or (0,)
+            query = "SELECT count(*), max(sequence) FROM reading WHERE characteristic_id = %s"
+            assert connection.execute(query, (of_seat,)).fetchone() == (240, 240)
+            query = "SELECT count(*) FROM reading_summary WHERE characteristic_id = %s AND level = 5"
+            assert connection.execute(query, (of_seat,)).fetchone() == (7,)
         with psycopg.connect(coordinator) as connection:
-            assert connection.execute("SELECT count(*), max(sequence) FROM far.reading").fetchone() == (240, 240)
-            assert connection.execute("SELECT count(*) FROM far.reading_summary WHERE level = 5").fetchone() == (7,)
             assert citus.node_of(connection, "far") == citus.nodes(connection)[1]
 
     @pytest.mark.parametrize(
@@ -191,6 +203,28 @@ class TestPlantOnANode:
         assert {status for status, _ in found} == {200, 201}
         for first in range(0, 160, 8):
             assert len({sequence for _, sequence in found[first : first + 8]}) == 1
+
+    def test_a_held_machine_holds_up_no_other_there(self, client: httpx.Client, coordinator: str) -> None:
+        """The node waits for the lock, by a patience that it has to be told of."""
+        other, held_seat = seat_of(client, "free"), seat_of(client, "held")
+
+        def send(name: str) -> tuple[int, str, float]:
+            begun = time.monotonic()
+            answer = client.post("/api/v1/readings", json={"characteristic": name, "measured": 40.0})
+            return answer.status_code, answer.json().get("type", ""), time.monotonic() - begun
+
+        assert [send(name)[0] for name in (held_seat, other)] == [201, 201]
+        with psycopg.connect(in_schema(coordinator, "far")) as holder, ThreadPoolExecutor(8) as pool:
+            (machine,) = holder.execute("SELECT id FROM machine WHERE key = 'held'").fetchone() or (0,)
+            holder.execute("SELECT 1 FROM machine_state WHERE machine_id = %s FOR UPDATE", (machine,))
+            held = pool.submit(send, held_seat)
+            others = [pool.submit(send, other) for _time in range(6)]
+            assert [each.result()[0] for each in others] == [201] * 6
+            assert not held.done(), "the others have waited for it"
+            status, kind, seconds = held.result()
+            assert (status, kind) == (503, "urn:inband:problem:busy")
+            assert seconds < 6
+        assert send(held_seat)[0] == 201
 
     def test_it_is_migrated_where_it_lies_and_moves_with_what_it_has(
         self, client: httpx.Client, coordinator: str

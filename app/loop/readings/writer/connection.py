@@ -27,6 +27,9 @@ PLANNER = "-c plan_cache_mode=force_generic_plan -c enable_seqscan=off -c enable
 # Citus finds the node of a statement by its values, and for a plan for any values none: *could not create distributed plan*.
 PLANNER_OF_CITUS = "SET plan_cache_mode = force_custom_plan"
 
+# The node waits for locks, and hears of our patience only what is said within a transaction.
+TOLD_TO_NODES = "SET citus.propagate_set_commands = 'local'"
+
 
 async def connect(database: Database, limits: str = LIMITS) -> Pipeline:
     """Open a connection for readings: statements prepared at their first use, transactions by our own word."""
@@ -35,6 +38,7 @@ async def connect(database: Database, limits: str = LIMITS) -> Pipeline:
     distributed = await (await connection.execute(CITUS)).fetchone() is not None
     if distributed:
         await connection.execute(PLANNER_OF_CITUS)
+        await connection.execute(TOLD_TO_NODES)
     return Pipeline(connection, distributed=distributed)
 
 
@@ -65,6 +69,7 @@ class WriterConnection:
             limits += f" -c lock_timeout={_ms(self.lock_wait)} -c statement_timeout={_ms(self.patience * STATEMENT)}"
         self.pipeline = await connect(self.database, limits)
         self._waits = self.lock_wait
+        self._tell_node()
         return self.pipeline
 
     async def wait_for_locks(self, seconds: float | None) -> None:
@@ -72,6 +77,12 @@ class WriterConnection:
         if self._waits != seconds and seconds is not None and self.pipeline is not None:
             await self.pipeline.run((("SELECT set_config('lock_timeout', $1, false)", _ms(seconds)),))
             self._waits = seconds
+            self._tell_node()
+
+    def _tell_node(self) -> None:
+        """Let the transactions of a plant on another node wait there as long for locks."""
+        if self.pipeline is not None and self.pipeline.distributed and self._waits is not None:
+            self.pipeline.begin = (("BEGIN",), (f"SET LOCAL lock_timeout = {_ms(self._waits)}",))
 
     async def close(self) -> None:
         """Give the connection back."""

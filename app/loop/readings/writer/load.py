@@ -94,7 +94,9 @@ async def load(
             if r.key is not None and not optimistic
         ],
     }
-    _begun, locked, ((text,),) = await pipeline.run((("BEGIN",), (LOCK, array(machines)), (LOAD, as_json(document))))
+    *_begun, locked, ((text,),) = await pipeline.run(
+        (*pipeline.begin, (LOCK, array(machines)), (LOAD, as_json(document)))
+    )
     loaded = _loaded.decode(text or b"")
     states = [(int(machine_id or 0), int(last or 0), int(version or 0)) for machine_id, last, version in locked]
     if any(snapshot.versions.get(machine_id, version) != version for machine_id, _last, version in states):

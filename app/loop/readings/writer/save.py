@@ -57,9 +57,11 @@ async def save(pipeline: Pipeline, pending: PendingWrites, *, begun: bool, notif
     copying = len(pending.verdicts) >= COPY_FROM
     locking: list[Step] = [(LOCK, array(machines))] if len(machines) > 1 and not begun else []
     if copying or pending.column_rows or pending.raised:  # something must be done before the last round trip
-        opening: list[Step] = [*([] if begun else [("BEGIN",)]), *locking, (GUARD, versions)]
+        opening: list[Step] = [*([] if begun else pipeline.begin), *locking, (GUARD, versions)]
         await (_number_alarms(pipeline, pending, opening) if pending.raised else pipeline.run(opening))
         begun, locking, versions = True, [], "[]"
+    elif pipeline.distributed and not begun:  # what its transactions begin with goes along to the node
+        begun, locking = True, [*pipeline.begin, *locking]
     records = [verdict.record() for verdict in pending.verdicts]
     if pending.column_rows:
         await _copy_columns(pipeline, pending.column_rows())
