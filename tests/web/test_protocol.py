@@ -41,7 +41,10 @@ held = Held()
 
 
 async def application(scope: dict[str, Any], receive: Any, send: Any) -> None:
-    """Answers with the number of bytes it was sent; `/slow` takes its time, and `/held` waits until somebody says so."""
+    """Answers with the number of bytes it was sent; `/slow` takes its time, and `/held` waits until somebody says so.
+
+    `/cookies` answers with the ms that reading them takes.
+    """
     body, more = b"", True
     while more:
         message = await receive()
@@ -55,7 +58,9 @@ async def application(scope: dict[str, Any], receive: Any, send: Any) -> None:
         while not held.answered.is_set():  # noqa: ASYNC110 - set by another thread
             await asyncio.sleep(0.01)
     if scope["path"] == "/cookies":
-        body = b"x" * len(Request(scope).cookies["b"])
+        begun = time.thread_time()
+        assert Request(scope).cookies["b"] == "1"
+        body = b"x" * round(1000 * (time.thread_time() - begun))
     await send({"type": "http.response.start", "status": 200, "headers": []})
     await send({"type": "http.response.body", "body": str(len(body)).encode()})
 
@@ -119,10 +124,8 @@ def test_a_head_of_the_usual_size_is_served(port: int) -> None:
 def test_a_cookie_of_backslashes_holds_up_nobody(port: int, sign: str) -> None:
     """Read for whoever asks for anything; 64 kB of them took ten seconds of the event loop."""
     cookie = {"Cookie": f'b=1; a="{sign * (MOST_HEAD * 3 // 4 // len(sign))}"'}
-    begun = time.monotonic()
     answer = httpx.get(f"http://127.0.0.1:{port}/cookies", headers=cookie, timeout=60, verify=TLS)
-    assert answer.status_code == 200
-    assert time.monotonic() - begun < 3
+    assert int(answer.text) < 1000  # ms of a processor; some 2 are needed
 
 
 def test_whoever_says_nothing_is_let_go(port: int) -> None:

@@ -28,7 +28,7 @@ PLANNER = "-c plan_cache_mode=force_generic_plan -c enable_seqscan=off -c enable
 PLANNER_OF_CITUS = "SET plan_cache_mode = force_custom_plan"
 
 # The node waits for locks, and hears of our patience only what is said within a transaction.
-TOLD_TO_NODES = "SET citus.propagate_set_commands = 'local'"
+FOR_NODES = "SET citus.propagate_set_commands = 'local'"
 
 
 async def connect(database: Database, limits: str = LIMITS) -> Pipeline:
@@ -38,7 +38,7 @@ async def connect(database: Database, limits: str = LIMITS) -> Pipeline:
     distributed = await (await connection.execute(CITUS)).fetchone() is not None
     if distributed:
         await connection.execute(PLANNER_OF_CITUS)
-        await connection.execute(TOLD_TO_NODES)
+        await connection.execute(FOR_NODES)
     return Pipeline(connection, distributed=distributed)
 
 
