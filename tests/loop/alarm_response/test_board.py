@@ -61,14 +61,14 @@ class TestWithoutScripts:
         again = operator.send(path, action="noted", comment="Seen")
         assert "Nothing else was changed." in first
         assert "Nothing else was changed." in again
-        assert "Already acknowledged by somebody else" not in again
+        assert "Already acknowledged by another user" not in again
 
     def test_who_comes_second_is_told_who_was_first(self, shop: Shop, operator: Person, server: Any) -> None:
         number = shop.read(350.0)["correction"]["number"]
         path = f"/alarms/{shop.alarms()[0]['id']}/acknowledge"
         operator.send(path, action="keep_cutting", comment="Edge good")
         late = Person(server, "operator").send(path, action="tool_replaced", comment="New insert")
-        assert "Already acknowledged by somebody else" in late
+        assert "Already acknowledged by another user" in late
         assert operator.name in late
         assert "Edge good" in late
         assert shop.correction(number)["status"] == "pending"
