@@ -135,29 +135,29 @@ class DraftOut(Body):
     """Preview of the baseline of this period; nothing is stored."""
 
     characteristic: str
-    chart: ChartName
+    chart: ChartName = Field(description="Single values, or subgroups by their ranges or by s.")
     quantity: Quantity
     first_sequence: int
     last_sequence: int
-    excluded: list[ExcludedIn]
-    grouping: Grouping | None
-    group_size: int | None
-    group_pause: float | None
+    excluded: list[ExcludedIn] = Field(description="Left out of the period, each run with its reason.")
+    grouping: Grouping | None = Field(description="How readings form subgroups; null for single values.")
+    group_size: int | None = Field(description="Readings in a subgroup, of `consecutive`.")
+    group_pause: float | None = Field(description="Minutes without a reading that end a subgroup, of `pause`.")
     shifts: str | None = Field(
         description="For `shift`: when shifts began, and by the clock of which zone, as it was frozen. Null in baselines "
         "frozen before 26 November 2026: they follow the plant's setting of today."
     )
-    ewma_lambda: float
-    ewma_width: float
-    ewma_exact: bool
-    cusum_k: float
-    cusum_h: float
-    cusum_headstart: float
-    average_span: int
-    centre: float
+    ewma_lambda: float = Field(description="Weight of the newest reading.")
+    ewma_width: float = Field(description="L: limits in standard deviations of the average.")
+    ewma_exact: bool = Field(description="Limits that widen from the first point on; else asymptotic ones.")
+    cusum_k: float = Field(description="Half the shift that is to be found, in sigma.")
+    cusum_h: float = Field(description="A sum beyond it is a signal, in sigma.")
+    cusum_headstart: float = Field(description="What both sums begin with, in sigma.")
+    average_span: int = Field(description="Readings in a moving average.")
+    centre: float = Field(description="Mean of what is charted, or as it was given.")
     sigma: float = Field(description="Of a single value.")
     lower: float = Field(description="Centre - 3 sigma: limits of single values; of subgroups the chart says its own.")
-    upper: float
+    upper: float = Field(description="Centre + 3 sigma.")
     estimator: str = Field(description="How sigma was come by; `given`: with the limits, by the customer.")
     degrees_of_freedom: float | None = Field(description="What sigma is worth; null where the limits were given.")
     readings: int = Field(description="That sigma was made of; 0 where the limits were given.")
