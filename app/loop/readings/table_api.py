@@ -31,7 +31,7 @@ _Line = Annotated[int | None, Field(ge=1, le=10_000_000, strict=True)]
 _Word = Annotated[str | None, Field(max_length=200)]
 
 
-class TableIn(Body):
+class TableImport(Body):
     """A table to import, decoded to text, and what the program is not to find out by itself."""
 
     name: Annotated[
@@ -93,7 +93,7 @@ class TableIn(Body):
     dry_run: Annotated[bool, Field(strict=True, description="Say what would happen and store nothing.")] = False
 
 
-class TableCharacteristic(BaseModel):
+class TableImportCharacteristic(BaseModel):
     """The result of one characteristic of the table."""
 
     name: Annotated[str, Field(description="Its column, or its name in the rows.")]
@@ -107,7 +107,7 @@ class TableCharacteristic(BaseModel):
     notes: Annotated[list[str], Field(description="What to know about its lines.")]
 
 
-class TableResult(BaseModel):
+class TableImportResult(BaseModel):
     """The result of an import."""
 
     stored: int
@@ -115,12 +115,12 @@ class TableResult(BaseModel):
     columns: Annotated[dict[str, str], Field(description="The column of each field, as the table was understood.")]
     unit: Annotated[str, Field(description="Of sizes whose row and cell name none.")]
     ignored: Annotated[list[str], Field(description="Columns that mean nothing here.")]
-    characteristics: list[TableCharacteristic]
+    characteristics: list[TableImportCharacteristic]
 
 
 @router.post("/readings/table", responses=problems(404, 409, 413))
 @takes(64 * MEGABYTE, by="engineer")
-def import_table(request: Request, session: SessionDep, caller: Engineer, given: TableIn) -> TableResult:
+def import_table(request: Request, session: SessionDep, caller: Engineer, given: TableImport) -> TableImportResult:
     """Import a table (CSV, text, NDJSON, JSON list): all of it or nothing, as history: it corrects nothing and raises no alarm.
 
     Import it twice and nothing is stored twice. What is wrong is named by line and column. Readings as they are measured are
@@ -138,14 +138,14 @@ def import_table(request: Request, session: SessionDep, caller: Engineer, given:
         if given.characteristic or layout.names:
             refuse_incomplete(layout)
         how: dict[str, Any] = {"actor": caller.name, "source": given.name, "dry_run": given.dry_run}
-        left_out: list[TableCharacteristic] = []
+        left_out: list[TableImportCharacteristic] = []
         if given.characteristic:
             results = [_one(database, path, layout, given.characteristic, how)]
         else:
             columns, left_out, machine = _columns(database, layout, given)
             results = wide.import_apart(database, columns, path, layout, unit=given.unit, machine=machine, **how)
     done = [each.summary for each in results if each.summary is not None]
-    return TableResult(
+    return TableImportResult(
         stored=sum(each.stored for each in done),
         repeated=sum(each.repeated for each in done),
         columns={name: layout.named(name) for name in layout.columns},
@@ -158,7 +158,7 @@ def import_table(request: Request, session: SessionDep, caller: Engineer, given:
     )
 
 
-def _wishes(given: TableIn) -> Wishes:
+def _wishes(given: TableImport) -> Wishes:
     return Wishes(
         mapping=given.map,
         delimiter=BLANKS if given.delimiter == "blanks" else given.delimiter,
@@ -184,8 +184,8 @@ def _one(database: Database, path: Path, layout: Layout, key: str, how: dict[str
 
 
 def _columns(
-    database: Database, layout: Layout, given: TableIn
-) -> tuple[list[Column], list[TableCharacteristic], str | None]:
+    database: Database, layout: Layout, given: TableImport
+) -> tuple[list[Column], list[TableImportCharacteristic], str | None]:
     """The columns, or names in the rows, that are chosen; those that are left out; and the machine for new ones."""
     said = given.characteristics.items()
     columns = wide.columns_named(said, layout) if said else wide.columns_known(database, layout)
@@ -195,17 +195,17 @@ def _columns(
     unknown = _("nothing here has its key or name; name it under characteristics")
     chosen = {column.place for column in columns}
     left_out = [
-        TableCharacteristic(name=each.name, left_out=each.not_new or unknown, notes=[])
+        TableImportCharacteristic(name=each.name, left_out=each.not_new or unknown, notes=[])
         for each in drawn.contents(layout)
         if each.index not in chosen
     ]
     return columns, left_out, machine
 
 
-def _result(result: ColumnResult, layout: Layout, *, alone: bool) -> TableCharacteristic:
+def _result(result: ColumnResult, layout: Layout, *, alone: bool) -> TableImportCharacteristic:
     column, summary, trouble, created = result
     name = layout.named("measured") if alone else layout.subjects[column.place]
-    made = TableCharacteristic(name=name, characteristic=column.characteristic, created=created, notes=[])
+    made = TableImportCharacteristic(name=name, characteristic=column.characteristic, created=created, notes=[])
     if summary is not None:
         made.stored, made.repeated, made.first_sequence = summary.stored, summary.repeated, summary.first_sequence
         made.notes = summary.notes
