@@ -269,6 +269,7 @@ class Play:
             "characteristics": {str(number): key for number, key in self.keys.items()},
         }
         if self.kind == "haas":
+            simulator.latency = 0.0
             table["haas"] = table["haas"] | {"pause": 0.0}
         content = {
             "server": {"url": url},
