@@ -56,6 +56,22 @@ def _person(shop: Shop, n: int) -> Edit:
     return f"/people/{person['id']}", {"role": ("operator", "engineer")[n - 1]}
 
 
+def _route(shop: Shop, n: int) -> Edit:
+    name = f"route-{shop.machine}"
+    if n == 1:
+        anna: dict[str, Any] = {"name": name, "means": "mail", "address": "anna@example.com"}
+        steps = [{"receivers": [shop.call("POST", "/notifications/receivers", 201, **anna)["id"]]}]
+        shop.call("POST", "/notifications/routes", 201, name=name, enabled=False, steps=steps)
+    routes = shop.call("GET", "/notifications/routes?limit=1000")["items"]
+    route = next(each for each in routes if each["name"] == name)
+    return f"/notifications/routes/{route['id']}", {
+        "name": name,
+        "enabled": False,
+        "steps": route["steps"],
+        "repeat": n,
+    }
+
+
 EDITS: dict[str, Callable[[Shop, int], Edit]] = {
     "PATCH /machines/{machine}": lambda shop, n: (f"/machines/{shop.machine}", {"name": f"Lathe {n}"}),
     "PATCH /characteristics/{characteristic}": lambda shop, n: (
@@ -85,6 +101,7 @@ EDITS: dict[str, Callable[[Shop, int], Edit]] = {
     "PUT /work-zeros/fixtures/{machine}/{fixture}": _fixture,
     "PUT /gauge-studies/{study}": _study,
     "PATCH /people/{person}": _person,
+    "PUT /notifications/routes/{route}": _route,
 }
 
 

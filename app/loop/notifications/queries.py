@@ -46,11 +46,6 @@ def receiver(session: Session, number: int, *, hold: bool = False) -> Receiver:
     return found
 
 
-def hold_receiver(session: Session, given: Mapping[str, Any]) -> None:
-    """Hold the receiver that is named until the transaction ends."""
-    receiver(session, given["receiver"], hold=True)
-
-
 def own(session: Session, person_id: int | None) -> Receiver | None:
     """The mail address that a person has given; None without one."""
     query = select(Receiver).where(Receiver.person_id == person_id, Receiver.deleted_at.is_(None))

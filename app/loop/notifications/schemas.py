@@ -1,10 +1,11 @@
 """Routes, receivers and deliveries as JSON."""
 
+import re
 from collections.abc import Iterable
 from datetime import datetime, time, timedelta
 from typing import Annotated, Any, Literal, Self
 
-from pydantic import BaseModel, Field, model_validator
+from pydantic import AfterValidator, BaseModel, Field, model_validator
 from pydantic_core import PydanticCustomError
 
 from app.core.notify import Hours, Route, Step
@@ -15,7 +16,15 @@ from app.web.fields import LARGEST_ID, Body, Moment, Slug, Text200, answer_from
 Means = Literal["mail", "webhook", "apprise"]
 Tone = Literal["stop", "wear", "attention", "waiting", "steady"]
 Changes = Literal["alarm", "reading", "correction", "tool"]
-Clock = Annotated[str, Field(pattern=r"^([01]\d|2[0-3]):[0-5]\d$", description="By the plant's clock, such as 06:00.")]
+
+
+def _clock(text: str) -> str:
+    if not re.fullmatch("([01][0-9]|2[0-3]):[0-5][0-9]", text):
+        raise PydanticCustomError("clock", _("must be a time of the day, such as 06:00"))
+    return text
+
+
+Clock = Annotated[str, AfterValidator(_clock), Field(description="By the plant's clock, such as 06:00.")]
 Minutes = Annotated[int, Field(strict=True, ge=0, le=7 * 24 * 60)]
 Day = Annotated[int, Field(strict=True, ge=1, le=7)]
 
