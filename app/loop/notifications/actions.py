@@ -13,7 +13,7 @@ from app.access.audit.actions import record
 from app.access.callers import Caller
 from app.db.events import publish
 from app.db.tables import Event
-from app.errors import Conflict, FieldError, Invalid, NotAllowed, NotFound
+from app.errors import Conflict, FieldError, Invalid, NotFound
 from app.language.i18n import _
 from app.loop.alarms.kinds import kinds
 from app.loop.notifications import queries
@@ -29,7 +29,7 @@ _CHANGED = {"kind": "notifications"}
 
 
 def add_route(session: Session, given: RouteIn, caller: Caller) -> NotificationRoute:
-    """Add a route. Raises `Invalid` for names that nothing has, `Conflict` where there are `MOST_ROUTES`."""
+    """Add a route. Raises `Invalid` and `NotFound` for what is not there, `Conflict` where there are `MOST_ROUTES`."""
     _check_route(session, given)
     if len(queries.routes(session)) >= MOST_ROUTES:
         raise Conflict(_("There are {n} routes already.").format(n=MOST_ROUTES), _("Delete one first."))
@@ -68,7 +68,7 @@ def _rule(given: RouteIn) -> dict[str, Any]:
 
 
 def _check_route(session: Session, given: RouteIn) -> None:
-    """Refuse names that nothing has: such a route would wait for ever."""
+    """Refuse names that nothing has: such a route would wait for ever. Raises `Invalid`, and `NotFound` for a receiver."""
     errors = _unknown("kinds", given.kinds, {kind.name for kind in kinds()}, _("there is no kind of alarm {name}"))
     for field, named, key, words in (
         ("machines", given.machines, Machine.key, _("there is no machine {name}")),
@@ -76,13 +76,14 @@ def _check_route(session: Session, given: RouteIn) -> None:
     ):
         known = set(session.scalars(select(key).where(key.in_(named)))) if named else set[str]()
         errors += _unknown(field, named, known, words)
-    there = {row.id for row in queries.receivers(session)}
-    errors += _unknown("steps", sorted(queries.receivers_of(_rule(given))), there, _("there is no receiver {name}"))
     if errors:
         raise Invalid(f"{errors[0].field}: {errors[0].message}.", errors=errors)
+    there = {row.id for row in queries.receivers(session)}
+    for number in sorted(queries.receivers_of(_rule(given)) - there):
+        raise NotFound(_("There is no receiver {number}.").format(number=number), _("Choose one of the list."))
 
 
-def _unknown(field: str, named: Iterable[str | int], known: Container[Any], words: str) -> list[FieldError]:
+def _unknown(field: str, named: Iterable[str], known: Container[Any], words: str) -> list[FieldError]:
     return [FieldError(field, words.format(name=repr(each))) for each in named if each not in known]
 
 
@@ -180,9 +181,9 @@ def _facts(row: Receiver) -> dict[str, Any]:
 
 
 def set_own(session: Session, given: OwnAddressIn, caller: Caller, settings: Settings) -> Receiver:
-    """Say where the caller gets mail. Raises `NotAllowed` for a key, which is no person; `Invalid`."""
+    """Say where the caller gets mail. Raises `NotFound` for a key, which is no person; `Invalid`."""
     if caller.person_id is None:
-        raise NotAllowed(_("A key has no mail address."), _("Sign in as a person."))
+        raise NotFound(_("A key is no person and has no mail address."), _("Sign in as a person."))
     people.hold_person(session, {"person": caller.person_id})  # of two at once, one comes second
     row = queries.own(session, caller.person_id)
     if row is not None:

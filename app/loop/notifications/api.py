@@ -36,7 +36,7 @@ def list_notification_routes(session: SessionDep, after: After = 0, limit: Limit
     return page_of([RouteOut.of(row) for row in queries.routes(session, after, limit + 1)], limit, lambda row: row.id)
 
 
-@router.post("/notifications/routes", status_code=201, responses=problems(409))
+@router.post("/notifications/routes", status_code=201, responses=problems(404, 409))
 def add_notification_route(session: SessionDep, caller: Admin, route: RouteIn, response: Response) -> RouteOut:
     """Add a route: from now on its receivers are notified of the alarms that it is for, those that are active already too."""
     row = actions.add_route(session, route, caller)

@@ -6,8 +6,13 @@ of the others waiting.
 
 import asyncio
 import logging
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
+from contextvars import copy_context
 from datetime import date
+from functools import partial
+from typing import TypeVar
 
 from sqlalchemy.exc import OperationalError
 
@@ -18,6 +23,8 @@ from app.loop.notifications.means import Answer, Job, deliver
 from app.settings import Settings
 
 log = logging.getLogger(__name__)
+
+Result = TypeVar("Result")
 
 EVERY = 2.0  # s between two looks
 TIDY = 3600.0  # s between two looks for what is old
@@ -31,6 +38,7 @@ class Notifier:
         self._database = database
         self._settings = settings
         self._days_off = frozenset(date.fromisoformat(day) for day in settings.days_off.split(",") if day)
+        self._threads = ThreadPoolExecutor(2, thread_name_prefix="notifications")  # never those of the readings door
         self._closing = asyncio.Event()
         self._task: asyncio.Task[None] | None = None
         self._deliveries: set[asyncio.Task[None]] = set()
@@ -50,6 +58,7 @@ class Notifier:
             for task in hanging:
                 task.cancel()
             await asyncio.gather(*hanging, return_exceptions=True)
+        self._threads.shutdown(wait=False)
 
     async def _run(self) -> None:
         tidied = -TIDY
@@ -59,7 +68,7 @@ class Notifier:
                 now = asyncio.get_running_loop().time()
                 if now - tidied >= TIDY:
                     tidied = now
-                    await asyncio.to_thread(self._tidy)
+                    await self._in_thread(self._tidy)
                 self._outage.is_over()
             except OperationalError as error:
                 self._outage.goes_on(error)
@@ -70,7 +79,7 @@ class Notifier:
 
     async def look(self) -> None:
         """Begin what is due."""
-        for job in await asyncio.to_thread(self._plan):
+        for job in await self._in_thread(self._plan):
             task = asyncio.get_running_loop().create_task(self._deliver(job), name=f"delivery {job.delivery}")
             self._deliveries.add(task)
             task.add_done_callback(self._deliveries.discard)
@@ -84,9 +93,13 @@ class Notifier:
         if not answer.delivered:
             log.warning("delivery %d to receiver %d failed: %s", job.delivery, job.receiver, answer.text)
         try:
-            await asyncio.to_thread(self._end, job, answer)
+            await self._in_thread(partial(self._end, job, answer))
         except OperationalError as error:  # it counts as lost and is sent again
             self._outage.goes_on(error)
+
+    async def _in_thread(self, work: Callable[[], Result]) -> Result:
+        """The result of a transaction, in this plant's time."""
+        return await asyncio.get_running_loop().run_in_executor(self._threads, copy_context().run, work)
 
     def _plan(self) -> list[Job]:
         with self._database.begin() as session:

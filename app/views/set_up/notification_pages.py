@@ -262,7 +262,7 @@ def send_own(request: Request, session: SessionDep, caller: Viewer, settings: Se
                 sent = {"address": form.get("address", "").strip(), "quiet": _hours(form, "quiet", EVERY_DAY)}
                 actions.set_own(session, parsed(OwnAddressIn, sent), caller, settings)
     except InbandError as error:
-        if error.status == 403:
+        if caller.person_id is None:
             raise
         return _own(request, session, caller, form, error=error)
     return RedirectResponse(f"/account/notifications?done={form.get('do') or 'saved'}", 303)

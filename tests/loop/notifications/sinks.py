@@ -30,7 +30,7 @@ class Mails:
         self.mails: list[Message] = []
         self.encrypted: list[bool] = []
         more: dict[str, Any] = {"tls_context": context, "require_starttls": True} if context else {}
-        self.controller = Controller(self, hostname="127.0.0.1", port=0, **more)
+        self.controller = Controller(self, hostname="127.0.0.1", port=0, ready_timeout=60, **more)
 
     async def handle_DATA(self, server: SMTP, session: Any, envelope: Any) -> str:  # noqa: N802 - aiosmtpd's name
         """Keep a mail."""

@@ -42,7 +42,7 @@ def test_a_receiver_is_added_tested_and_its_delivery_is_seen(shop: Shop, admin: 
     page.get_by_role("button", name="Add receiver").click()
     expect(page.get_by_role("status").filter(has_text="Added.")).to_be_visible()
     row = page.locator("#receivers tr").filter(has_text=name)
-    row.get_by_role("button", name="Send a test").click()
+    row.get_by_role("button", name="Send a test").dispatch_event("click")  # in one step: the part may be swapped
     expect(page.get_by_role("status").filter(has_text="A test is sent within seconds")).to_be_visible()
     delivery = page.locator("#delivery-list tr").filter(has_text=name)
     expect(delivery).to_contain_text("INBAND_MAIL_SERVER")  # of this server, which has none; it comes by itself
@@ -112,7 +112,9 @@ def test_the_secret_of_a_webhook_is_shown_once(shop: Shop, admin: Person) -> Non
     text = admin.send("/setup/notifications/receivers", **fields)
     (secret,) = re.findall(r'<p class="secret"><code>([\w-]{43})</code>', text)
     assert secret not in admin.open("/setup/notifications")
-    assert receiver_named(shop, name)["events"] == ["tool"]
+    made = receiver_named(shop, name)
+    assert made["events"] == ["tool"]
+    admin.send(f"/setup/notifications/receivers/{made['id']}/delete")  # other tests of this server change tools
     bad = admin.send("/setup/notifications/receivers", 422, **fields | {"address": "ftp://andon"})
     assert "Must be an address such as https://" in bad
 
