@@ -73,13 +73,13 @@ class TableImport(Body):
     delimiter: Annotated[
         str | None, Field(max_length=6, description="One sign, or blanks for two of them and more.")
     ] = None
-    decimal: Literal[".", ","] | None = None
+    decimal: Annotated[Literal[".", ","] | None, Field(description="The decimal sign; if left out, found out.")] = None
     unit: Annotated[Unit | None, Field(description="Of sizes whose header, row and cell name none.")] = None
     timezone: Annotated[
         _Word, Field(description="Zone of times without an offset; if left out, that of the plant.")
     ] = None
     time_format: Annotated[_Word, Field(description="Such as %d/%m/%Y %H:%M, or seconds since 1970-01-01.")] = None
-    header_line: _Line = None
+    header_line: Annotated[_Line, Field(description="Of the names of the columns; if left out, found out.")] = None
     first_line: Annotated[_Line, Field(description="Of readings.")] = None
     last_line: Annotated[_Line, Field(description="Of readings; sums and means stand below.")] = None
     missing: Annotated[
@@ -98,7 +98,7 @@ class TableImportCharacteristic(BaseModel):
 
     name: Annotated[str, Field(description="Its column, or its name in the rows.")]
     characteristic: Annotated[str | None, Field(description="Its key here; null if it is left out.")] = None
-    created: bool = False
+    created: Annotated[bool, Field(description="It was set up by this import.")] = False
     stored: Annotated[int, Field(description="Readings that are new.")] = 0
     repeated: Annotated[int, Field(description="Readings that were stored before.")] = 0
     first_sequence: Annotated[int | None, Field(description="Number of the first new reading.")] = None
@@ -110,12 +110,14 @@ class TableImportCharacteristic(BaseModel):
 class TableImportResult(BaseModel):
     """The result of an import."""
 
-    stored: int
-    repeated: int
+    stored: Annotated[int, Field(description="Readings that are new, of all characteristics.")]
+    repeated: Annotated[int, Field(description="Readings that were stored before.")]
     columns: Annotated[dict[str, str], Field(description="The column of each field, as the table was understood.")]
     unit: Annotated[str, Field(description="Of sizes whose row and cell name none.")]
     ignored: Annotated[list[str], Field(description="Columns that mean nothing here.")]
-    characteristics: list[TableImportCharacteristic]
+    characteristics: Annotated[
+        list[TableImportCharacteristic], Field(description="Those that are imported, then those that are left out.")
+    ]
 
 
 @router.post("/readings/table", responses=problems(404, 409, 413))
