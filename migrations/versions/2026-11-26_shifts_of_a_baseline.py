@@ -14,7 +14,7 @@ depends_on = None
 
 
 def upgrade() -> None:
-    op.execute("ALTER TABLE baseline ADD COLUMN shifts VARCHAR")
+    op.execute("ALTER TABLE baseline ADD COLUMN shifts TEXT")
 
 
 def downgrade() -> None:

@@ -146,6 +146,7 @@ class TestByTouch:
         hands = at_the_plant(page, operator)
         hands.tap(name(page, floor))
         chart = page.locator("plotly-chart.zones")
+        expect(chart).to_be_visible()  # the next page
         drawn(page)
         chart.scroll_into_view_if_needed()
         hands.count += 1

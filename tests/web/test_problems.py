@@ -103,7 +103,7 @@ class TestBodies:
             (b"NaN", "body", "must be a finite number"),
             (b'{"key": "\xff"}', "body", "is not UTF-8"),
             (b'\xef\xbb\xbf{"key": "a"}', "body", ""),
-            (b'{"key": "a", "key": "b"}', "body", 'says "key" twice'),
+            (b'{"key": "a", "key": "b"}', "body", 'gives "key" twice'),
             (b'{"name": "\\ud800"}', "name", "half a character"),
             (b'{"name": "\\u0000"}', "name", "U+0000"),
             (b'{"na\\u0000me": 1}', "body", "U+0000"),
@@ -167,7 +167,7 @@ class TestBodies:
         names = ",".join(f'"{number:x}":1' for number in range(100_000))
         with pytest.raises(Invalid) as refusal:
             read_json(f'{{{names},"last":1,"last":2}}'.encode(), "application/json")
-        assert refusal.value.errors == [FieldError("body", 'says "last" twice; say it once')]
+        assert refusal.value.errors == [FieldError("body", 'gives "last" twice; give it once')]
 
     def test_lists_by_the_ten_thousand_are_not_made(self) -> None:
         """Python makes them while everybody waits. Brackets in a text are no lists, however it ends."""

@@ -12,8 +12,8 @@ from app.language.i18n import _
 from app.loop.characteristics.queries import CurrentCharacteristic
 from app.loop.summaries import queries as statistics
 from app.quality.capability import queries
+from app.quality.capability.kinds import SigmaBy
 from app.quality.capability.queries import CONFIDENCE, COVERAGE, USUAL, Side, Study
-from app.quality.capability.sigma_within import SigmaBy
 from app.web.choice import InPeriod
 from app.web.fields import LARGEST_ID
 

@@ -14,9 +14,9 @@ from app.core.spc.normality import Normality
 from app.core.spc.refusal import Refused
 from app.loop.summaries import wording as statistics
 from app.quality.capability import fit_wording, machine_wording, wording
+from app.quality.capability.kinds import SigmaBy
 from app.quality.capability.machine_queries import Run
 from app.quality.capability.queries import Study
-from app.quality.capability.sigma_within import SigmaBy
 from app.web.fields import answer_from
 
 

@@ -1,7 +1,5 @@
 """Sigma within by choice: from neighbours, or pooled inside the readings of one part, one shift, one nest or spindle. Never writes."""
 
-from enum import StrEnum
-
 import numpy as np
 from sqlalchemy.orm import Session
 
@@ -10,16 +8,8 @@ from app.core.spc.shewhart import FEWEST_SUBGROUPS
 from app.core.spc.spread import Sigma, pooled, subgroups
 from app.loop.characteristics.queries import CurrentCharacteristic
 from app.loop.summaries.queries import History, Window
+from app.quality.capability.kinds import SigmaBy
 from app.quality.control_charts.series_queries import begin_of_runs, labels_of
-
-
-class SigmaBy(StrEnum):
-    """Readings whose differences give sigma within."""
-
-    NEIGHBOURS = "neighbours"
-    PART = "part"
-    SHIFT = "shift"
-    NEST = "nest"
 
 
 def sigma_within(

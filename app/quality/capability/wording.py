@@ -13,8 +13,8 @@ from app.language.i18n import _, ngettext
 from app.language.numbers import beside, probability, signed, tolerance_um
 from app.loop.summaries import wording as statistics
 from app.quality.capability import fit_wording as fits
+from app.quality.capability.kinds import SigmaBy
 from app.quality.capability.queries import Study
-from app.quality.capability.sigma_within import SigmaBy
 
 MOST_NAMED = 40
 

@@ -17,11 +17,11 @@ from app.loop.characteristics import queries as characteristics
 from app.loop.summaries import queries as summaries
 from app.loop.summaries import wording as statistics
 from app.quality.capability import fit_wording, machine_wording, wording
+from app.quality.capability.kinds import SigmaBy
 from app.quality.capability.machine_queries import newest_run
 from app.quality.capability.pictures import interval
 from app.quality.capability.queries import CONFIDENCE, USUAL, Side
 from app.quality.capability.request import Confidence, Last, OfSigma, OneSide, StudyRequest, study_of
-from app.quality.capability.sigma_within import SigmaBy
 from app.quality.gauge_studies import queries as gauges
 from app.quality.gauge_studies import wording as gauge_wording
 from app.quality.proof import queries as proof

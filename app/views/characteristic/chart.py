@@ -20,7 +20,7 @@ from app.loop.summaries.queries import ChartData, ChartReading, Window
 from app.loop.tables.tools import AverageMemory
 from app.loop.timeline import queries as timeline
 from app.loop.timeline.figures import Event
-from app.views.characteristic.chart_corrections import changes_of, corrections_of, reading_link, steps_of, total_before
+from app.views.characteristic.chart_corrections import changes_of, corrections_of, steps_of, total_before
 from app.views.characteristic.figures import (
     Block,
     HandPoint,
@@ -31,6 +31,7 @@ from app.views.characteristic.figures import (
     SizeAxis,
     Step,
 )
+from app.views.characteristic.wording import reading_link
 
 MOST_BY_HAND = 200
 

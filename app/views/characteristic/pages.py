@@ -36,18 +36,16 @@ from app.loop.readings.by_hand.actions import measure_typed
 from app.loop.summaries import queries as statistics
 from app.loop.summaries import wording as statistics_wording
 from app.loop.summaries.queries import MOST_IN_HISTOGRAM, Window
-from app.loop.tables.readings import Reading
 from app.quality.wear import queries as wear
 from app.quality.wear.queries import Wear
 from app.quality.wear.wording import WearWords
 from app.views.characteristic import chart
 from app.views.characteristic import state_queries as plant
-from app.views.characteristic.chart_corrections import reading_link
 from app.views.characteristic.decisions import Decision, decision, decisions, version_of
 from app.views.characteristic.figures import angle_of, residuals_of, touches_picture
 from app.views.characteristic.figures_api import ResultName
 from app.views.characteristic.glance import band_picture
-from app.views.characteristic.wording import next_action, state_word
+from app.views.characteristic.wording import next_action, reading_link, state_word
 from app.web.choice import Choice, ChosenOnPage
 from app.web.deps import Before, FormDep, SessionDep
 from app.web.fields import LARGEST_ID, Reason
@@ -84,16 +82,10 @@ class CharacteristicView:
 
     @cached_property
     def last(self) -> dict[str, Any] | None:
-        """The last reading, as it was answered: the one that the state is of.
-
-        The highest number may be that of an older reading, which somebody has imported since.
-        """
-        entry, stream = reading_queries.entry_of(self._session, self.current.characteristic.key), self.row.stream
+        """The last reading, as it was answered: the one that the state is of."""
+        entry = reading_queries.entry_of(self._session, self.current.characteristic.key)
         assert entry is not None
-        found = reading_queries.latest(self._session, entry, None, 1)
-        if found and (found[0].received_at, found[0].measured) != (stream.last_received_at, stream.last_measured):
-            of_the_state = Reading.received_at == stream.last_received_at, Reading.measured == stream.last_measured
-            found = reading_queries.latest(self._session, entry, None, 1, *of_the_state) or found
+        found = plant.last_of(self._session, entry, self.row.stream)
         return reading_queries.answers(self._session, entry, found)[0] if found else None
 
     @cached_property

@@ -11,12 +11,14 @@ from sqlalchemy.orm import Session
 from app.core.parameters import Parameters
 from app.core.state import CALM, NEED_SOMEONE, CharacteristicState, Known, state_of
 from app.loop.machines.queries import machine_named
+from app.loop.readings import queries as readings
+from app.loop.readings.records import Entry, Record
 from app.loop.summaries import queries as statistics
 from app.loop.summaries.queries import Rejects
 from app.loop.tables.alarms import Alarm
 from app.loop.tables.characteristics import Characteristic, ParametersVersion
 from app.loop.tables.machines import Machine
-from app.loop.tables.readings import Exclusion, Stream
+from app.loop.tables.readings import Exclusion, Reading, Stream
 from app.loop.tables.tools import OPEN, AverageMemory, Correction, Tool
 from app.quality.wear.queries import OVERCORRECTS
 from app.quality.wear.tables import Outlook
@@ -223,3 +225,15 @@ def _trends(session: Session, machine_id: int | None) -> dict[int, tuple[list[fl
     """The last deviations by characteristic, oldest first, and when the first of them arrived."""
     rows = session.execute(text(_TREND), {"trend": TREND, "machine": machine_id})
     return {characteristic: (deviations, since) for characteristic, deviations, since in rows}
+
+
+def last_of(session: Session, entry: Entry, stream: Stream) -> list[Record]:
+    """Return the last reading that was decided, if there is one.
+
+    The highest number may be that of an older reading, which somebody has imported since.
+    """
+    found = readings.latest(session, entry, None, 1)
+    if found and (found[0].received_at, found[0].measured) != (stream.last_received_at, stream.last_measured):
+        decided = Reading.received_at == stream.last_received_at, Reading.measured == stream.last_measured
+        found = readings.latest(session, entry, None, 1, *decided) or found
+    return found

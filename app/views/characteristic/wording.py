@@ -57,3 +57,8 @@ _ACTIONS = {
     CharacteristicState.AWAITING_APPROVAL: lambda: _("Approve the correction of {amount}"),
     CharacteristicState.NO_DATA: lambda: _("Measure the first part"),
 }
+
+
+def reading_link(key: str, sequence: int) -> str:
+    """Address of the page of a reading."""
+    return f"/characteristics/{key}/readings/{sequence}"

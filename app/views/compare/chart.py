@@ -13,7 +13,7 @@ from app.loop.summaries.queries import Numbers
 from app.loop.timeline import queries as timeline
 from app.loop.timeline.figures import Event, span_of
 from app.quality.capability.queries import Judgement, judgement_of
-from app.views.characteristic.chart_corrections import reading_link
+from app.views.characteristic.wording import reading_link
 from app.views.compare.figures import Course
 from app.views.compare.series import Compared
 

@@ -15,8 +15,8 @@ from app.files.documents.schemas import ReportOut
 from app.files.formats import periods
 from app.language.times import plant_zone
 from app.loop.characteristics import queries as characteristics
+from app.quality.capability.kinds import SigmaBy
 from app.quality.capability.request import OfSigma
-from app.quality.capability.sigma_within import SigmaBy
 from app.views.reports import queries
 from app.views.reports.request import EVERYTHING, ReportRequest, SectionName, section_names, zone_or_plants
 from app.web.api import CharacteristicKey, api_router, problems

@@ -13,7 +13,7 @@ from app.files.documents.content import Paper
 from app.files.formats import cell_values, periods
 from app.language.i18n import _
 from app.language.times import plant_zone
-from app.quality.capability.sigma_within import SigmaBy
+from app.quality.capability.kinds import SigmaBy
 
 LAST = USUAL_READINGS
 """Readings of a report for which no period was named."""

@@ -237,7 +237,7 @@ class TestChange:
         problem = change(common_shop, 422, R33=None)
         assert problem["errors"][0] == {
             "field": "parameters.zero_range",
-            "message": "R33 zero range is missing; say it",
+            "message": "R33 zero range is missing; enter it",
         }
 
     def test_an_averaging_limit_left_to_its_default_follows_the_tolerance(self, server: Any) -> None:
@@ -411,7 +411,7 @@ def test_what_json_readers_disagree_about_is_refused(common_shop: Shop, bad: str
 
 def test_under_two_names_at_once(common_shop: Shop) -> None:
     problem = change(common_shop, 422, R33=0.001, zero_range=0.002)
-    assert "is said twice" in problem["errors"][0]["message"]
+    assert "is given twice" in problem["errors"][0]["message"]
 
 
 def test_everything_wrong_is_said_at_once(common_shop: Shop) -> None:
