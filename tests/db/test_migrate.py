@@ -50,6 +50,7 @@ ADDED: dict[str, dict[str, Any]] = {
     "person": {"pin_hash": None},
     "api_key": {"last_used_at": None},
     "correction": {"mapping": None},
+    "baseline": {"shifts": None},
     "report_job": {"person_id": None, "key_id": None},
     "outlook": dict.fromkeys(("record_of", "lives", "tested", "held", "widening")),
 }
