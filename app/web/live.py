@@ -191,13 +191,8 @@ class Live:
                 log.warning("old events could not be deleted: %s", error)
             await asyncio.sleep(600)
 
-    async def stream(
-        self, access: Access, after: int | None, machine: str | None = None, *, resumed: bool = True
-    ) -> AsyncIterator[bytes]:
-        """Server-sent events from now on, or from number `after` on; of one machine, or of all. They end with the access.
-
-        resumed: the client was cut off, and gets every single one, not the newest of many.
-        """
+    async def stream(self, access: Access, after: int | None, machine: str | None = None) -> AsyncIterator[bytes]:
+        """Server-sent events from now on, or from number `after` on; of one machine, or of all. They end with the access."""
         client: asyncio.Queue[Message | None] = asyncio.Queue()
         self._clients[client] = access
         self._opened.set()
@@ -206,7 +201,7 @@ class Live:
             known = self._last if after is None else after
             yield _frame("hello", {}, known)
             sent = 0 if known is None else known
-            if after is not None and (resumed or after != self._last):
+            if after is not None:
                 for message in await self._missed(after):
                     sent = message.number
                     if message.machine in {None, machine} or machine is None:
@@ -286,14 +281,11 @@ def stream(
 ) -> StreamingResponse:
     """The events of one machine, or of all, as an answer; they end with the access."""
     live: Live = request.app.state.live
-    resumed = (
-        last_event_id is not None and last_event_id.isascii() and last_event_id.isdigit() and len(last_event_id) < 19
-    )
-    if last_event_id is not None and resumed:
+    if last_event_id is not None and last_event_id.isascii() and last_event_id.isdigit() and len(last_event_id) < 19:
         after = int(last_event_id)
 
     async def frames() -> AsyncIterator[bytes]:
-        async for frame in live.stream(access, after, machine, resumed=resumed):
+        async for frame in live.stream(access, after, machine):
             yield frame
 
     return StreamingResponse(
