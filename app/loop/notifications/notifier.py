@@ -58,7 +58,7 @@ class Notifier:
             for task in hanging:
                 task.cancel()
             await asyncio.gather(*hanging, return_exceptions=True)
-        self._threads.shutdown(wait=False)
+        await asyncio.to_thread(self._threads.shutdown)  # no transaction outlives the pool of connections
 
     async def _run(self) -> None:
         tidied = -TIDY
