@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any, cast
 
 from sqlalchemy import PoolProxiedConnection, QueuePool, create_engine
 from sqlalchemy.orm import Session, sessionmaker
+from sqlalchemy.pool import ConnectionPoolEntry
 
 from app.db.connections import LIMITS, Connections, plain_url
 
@@ -22,6 +23,17 @@ class Pool(QueuePool):
     """Connections kept open, which says how long one waits for one of them."""
 
     waited: Callable[[float], object] | None = None
+    _ended = False
+
+    def dispose(self) -> None:
+        """Close the connections: those that nobody has now, the others when they are given back."""
+        self._ended = True
+        super().dispose()
+
+    def _do_return_conn(self, record: ConnectionPoolEntry) -> None:
+        if self._ended:
+            record.close()
+        super()._do_return_conn(record)
 
     def connect(self) -> PoolProxiedConnection:
         """Take a connection that works, once there is one."""

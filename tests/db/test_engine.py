@@ -57,3 +57,13 @@ def test_a_connection_that_broke_is_replaced(database: Database) -> None:
         )
     with database.begin() as session:
         assert session.scalar(text("SELECT 1")) == 1
+
+
+def test_a_connection_given_back_after_the_end_is_closed(database: Database) -> None:
+    connection = database.engine.connect()
+    driver = connection.connection.driver_connection
+    assert isinstance(driver, psycopg.Connection)
+    database.close()
+    assert not driver.closed
+    connection.close()
+    assert driver.closed
