@@ -20,10 +20,11 @@ class _Andon(BaseHTTPRequestHandler):
     def do_POST(self) -> None:
         length = min(int(self.headers.get("Content-Length") or 0), LONGEST)
         try:
-            subject = json.loads(self.rfile.read(length)).get("subject", "")
+            subject = json.loads(self.rfile.read(length)).get("subject")
         except (ValueError, AttributeError):
             subject = "?"
-        log.info("andon: %s", subject)
+        if subject:  # else a list of changes
+            log.info("andon: %s", subject)
         self.send_response(204)
         self.end_headers()
 
