@@ -100,7 +100,7 @@ async def _in_thread(slots: threading.BoundedSemaphore, work: Callable[[], Resul
     def run() -> None:
         try:
             ended: tuple[Callable[[Any], None], Any] = (result.set_result, work())
-        except Exception as error:  # noqa: BLE001 - handed to who waits
+        except Exception as error:  # noqa: BLE001 - raised where it is awaited
             ended = (result.set_exception, error)
         finally:
             slots.release()
