@@ -23,6 +23,7 @@ from app.core.spc.counts import CountChart, counts_chart
 from app.core.spc.distributions import Family, quantiles
 from app.core.spc.fitting import fit_of_family, p_of_anderson_darling
 from app.core.spc.in_time import brown_forsythe, decompose, successive
+from app.core.spc.machine_performance import machine_performance
 from app.core.spc.normality import anderson_darling, p_of, shapiro_wilk
 from app.core.spc.rules import RULES, Rule, RuleName, signals, signals_of_cusum
 from app.core.spc.spread import Estimator, Sigma, freedom_of_moving_ranges, from_ranges, subgroups, summary
@@ -217,6 +218,19 @@ def intervals(given: Given) -> Got:
     }
 
 
+def machine(given: Given) -> Got:
+    """Pm and Pmk of a run of parts, with the interval of Pm."""
+    result = machine_performance(readings_of(given), Limits(given["lower"], given["upper"]))
+    if result.pm is None or result.pmk is None:
+        return {}
+    return {
+        "pm": result.pm.value,
+        "pm_low": result.pm.low,
+        "pm_high": result.pm.high,
+        "pmk": result.pmk.value,
+    }
+
+
 def one_sided_bounds(given: Given) -> Got:
     """Of readings whose one limit lies k standard deviations off: 3 times the lower bound of Ppk."""
     bounds = [ppk_of(Limits(None, k), 0.0, 1.0, given["count"], given["confidence"]).low for k in given["k"]]
@@ -346,6 +360,7 @@ ENGINE: dict[str, Callable[[Given], Got]] = {
     "capability": capable,
     "potential": potential,
     "intervals": intervals,
+    "machine_performance": machine,
     "one_sided_bounds": one_sided_bounds,
     "percentile": by_percentile,
     "order_statistics": places,

@@ -38,6 +38,7 @@ def topics() -> dict[str, tuple[str, tuple[str, ...]]]:
                 "capability",
                 "potential",
                 "intervals",
+                "machine_performance",
                 "one_sided_bounds",
                 "percentile",
                 "percentile_indices",
