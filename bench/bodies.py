@@ -25,6 +25,7 @@ from bench.plant import plant
 JSON, FORM, FILE = "application/json", "application/x-www-form-urlencoded", "multipart/form-data; boundary=b"
 WANTED = 0.1  # s
 IDLE = 3.0  # s of looking before anything is sent
+TIMES = 5  # that a request which seems to hold it up is sent
 
 
 class Request(NamedTuple):
@@ -86,9 +87,8 @@ class Watch:
 
     def __init__(self, url: str) -> None:
         self._url = urlsplit(url)
-        self._ending = threading.Event()
-        self.beside = "nothing"
-        self.worst: tuple[float, str] = (0.0, "nothing")
+        self._ending, self._looked = threading.Event(), threading.Event()
+        self._worst = 0.0
 
     def __enter__(self) -> Self:
         self._thread = threading.Thread(target=self._look)
@@ -99,13 +99,21 @@ class Watch:
         self._ending.set()
         self._thread.join()
 
+    def longest(self) -> float:
+        """The longest that it took since this was asked last, s; the answer that is under way now is waited for."""
+        self._looked.clear()
+        self._looked.wait()
+        found, self._worst = self._worst, 0.0
+        return found
+
     def _look(self) -> None:
         connection = http.client.HTTPConnection(self._url.hostname or "", self._url.port, timeout=120)
         while not self._ending.wait(0.002):
-            beside, began = self.beside, time.perf_counter()
+            began = time.perf_counter()
             connection.request("GET", "/health/live")
             connection.getresponse().read()
-            self.worst = max(self.worst, (time.perf_counter() - began, beside))
+            self._worst = max(self._worst, time.perf_counter() - began)
+            self._looked.set()
         connection.close()
 
 
@@ -122,15 +130,24 @@ def send(url: str, request: Request, headers: dict[str, str]) -> int:
 
 
 def held(url: str, requests: Iterable[Request], headers: dict[str, str]) -> Held:
-    """Send them one after the other and look at /health/live meanwhile."""
+    """Send them one after the other and look at /health/live meanwhile.
+
+    One that seems to hold it up is sent again: what the request does comes again, what other programs of this computer did
+    does not, so the least of these times counts.
+    """
+    worst = (0.0, "nothing")
     with Watch(url) as watch:
         time.sleep(IDLE)
-        idle, _nothing = watch.worst
-        watch.worst = (0.0, "nothing")
+        idle = watch.longest()
         for request in requests:
-            watch.beside = f"{request.method} {request.path}, {request.name}"
-            send(url, request, headers)
-    return Held(idle, *watch.worst)
+            took = float("inf")
+            for _ in range(TIMES):
+                send(url, request, headers)
+                took = min(took, watch.longest())
+                if took <= idle + WANTED:
+                    break
+            worst = max(worst, (took, f"{request.method} {request.path}, {request.name}"))
+    return Held(idle, *worst)
 
 
 def requests(size: int, only: str = "") -> Iterator[Request]:

@@ -61,7 +61,7 @@ class ServerProtocol(HttpToolsProtocol):
 
     A head that is too long is answered 431, one that does not arrive within ``head_patience`` seconds 408, and a body that
     falls silent for ``body_patience`` seconds, or comes in slower than ``body_rate`` bytes a second beyond these, is not waited
-    for either. Where there are more connections than files are left for, the one
+    for either; nor is one that has not ended ``body_patience`` seconds after it began although it is answered. Where there are more connections than files are left for, the one
     that has been silent longest makes room; if none is silent, the new one is answered 503.
     """
 
@@ -164,12 +164,17 @@ class ServerProtocol(HttpToolsProtocol):
         if self.waits_for == "body":
             flow: FlowControl = self.flow
             now = self.loop.time()
+            cycle: RequestResponseCycle = self.cycle
+            answered = cycle.response_complete
             if flow.read_paused:  # we are the ones who do not read
                 self._body_bytes, self._body_since = 0, now
-            in_all = self._body_since + self._body_bytes / self.body_rate
+            in_all = self._body_since + (0.0 if answered else self._body_bytes / self.body_rate)
             left = min(self.heard_at, in_all) + self.body_patience - now
             if left > 0 or flow.read_paused:
                 self._timer = self.loop.call_later(max(left, 1.0), self._give_up)
+                return
+            if answered:
+                self.transport.close()
                 return
         if self.waits_for == "head" and not self._head_bytes:
             self.transport.close()  # it has asked for nothing, so nothing is answered

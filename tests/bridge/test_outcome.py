@@ -6,7 +6,7 @@ from typing import Any
 
 import pytest
 
-from app.bridge.simulators.model import UNMAPPED, Steps
+from app.bridge.simulators.model import OWNERS, UNMAPPED, Steps
 from app.bridge.simulators.mqtt import mosquitto
 from app.core.ring import Told
 from app.jobs.actions import run_jobs
@@ -186,12 +186,17 @@ def test_an_offset_in_inches_is_held_before_it_runs_away(server: Server, tmp_pat
 @pytest.mark.parametrize("kind", ["rest", "heidenhain"])
 @pytest.mark.parametrize("amiss", [0.0, 1 / 25.4])
 def test_an_offset_that_does_next_to_nothing_is_told(server: Server, tmp_path: Path, kind: str, amiss: float) -> None:
-    """Parts go out by the wear that nothing takes back; the alarm says that corrections do nothing, tool by tool."""
+    """Parts go out by the wear that nothing takes back; the alarm says that corrections do nothing, tool by tool.
+
+    With 1/25.4 a tool that two characteristics correct in each part may settle below the tolerance: 0.5 µm × 25.4 / 2 = 6.35 µm. Its
+    parts are good, and no alarm calls them oversize.
+    """
     one, found = mistaken(server, kind, 40, tmp_path, eventful=False, amiss=amiss)
     raised = alarms(one)
-    assert found.out
     assert raised["unusual_gain"] | raised.get("opposite_effect", set()) >= {1, 2, 3, 4, 5}
-    assert raised["oversize"] >= {1, 2, 3, 4, 5}
+    out = {OWNERS[number - 1] for number, _ in found.out}
+    assert out >= ({3, 4, 5} if amiss else {1, 2, 3, 4, 5})
+    assert raised["oversize"] - {UNMAPPED} == out
 
 
 @pytest.mark.long

@@ -43,9 +43,9 @@ held = Held()
 async def application(scope: dict[str, Any], receive: Any, send: Any) -> None:
     """Answers with the number of bytes it was sent; `/slow` takes its time, and `/held` waits until somebody says so.
 
-    `/cookies` answers with the ms that reading them takes.
+    `/cookies` answers with the ms that reading them takes, `/early` before it has read a body.
     """
-    body, more = b"", True
+    body, more = b"", scope["path"] != "/early"
     while more:
         message = await receive()
         if message["type"] == "http.disconnect":
@@ -174,6 +174,30 @@ def test_a_body_that_drips_in_is_let_go(port: int, monkeypatch: pytest.MonkeyPat
         while time.monotonic() < deadline:
             time.sleep(PATIENCE / 20)
             client.sendall(b"x")
+
+
+def test_a_body_that_goes_on_after_its_answer_is_not_taken_for_ever(port: int) -> None:
+    """A stranger hears 401 at once, and could go on sending as long as the wires carry it."""
+    with connected(port) as client:
+        client.sendall(b"POST /early HTTP/1.1\r\nHost: x\r\nTransfer-Encoding: chunked\r\n\r\n")
+        assert client.recv(65_536).startswith(b"HTTP/1.1 200")
+        deadline = time.monotonic() + 20
+        with pytest.raises(ConnectionError):
+            while time.monotonic() < deadline:
+                client.sendall(b"64\r\n" + b"x" * 100 + b"\r\n")
+                time.sleep(PATIENCE / 100)
+
+
+def test_a_body_that_ends_after_its_answer_leaves_the_connection_to_the_next_request(
+    port: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(Impatient, "head_patience", 30.0)
+    monkeypatch.setattr(Impatient, "body_patience", 30.0)
+    with connected(port) as client:
+        client.sendall(b"POST /early HTTP/1.1\r\nHost: x\r\nContent-Length: 10\r\n\r\n12345")
+        assert client.recv(65_536).startswith(b"HTTP/1.1 200")
+        client.sendall(b"67890GET / HTTP/1.1\r\nHost: x\r\nConnection: close\r\n\r\n")
+        assert heard(client).startswith(b"HTTP/1.1 200")
 
 
 class TestMoreConnectionsThanFiles:
