@@ -1,4 +1,4 @@
-# Inband alone, as a wheel; it wants a PostgreSQL 18 (docker-compose.yml brings one) and a proxy with https before it.
+# Inband and its simulators, as wheels; it wants a PostgreSQL 18 (docker-compose.yml brings one) and a proxy with https before it.
 # Both images are named to the release of Debian; a digest pins them to the byte:
 #     docker build --build-arg PYTHON=python:3.13-slim-trixie@sha256:... .
 ARG PYTHON=python:3.13-slim-trixie
@@ -20,7 +20,9 @@ COPY docs/reference/api-examples docs/reference/api-examples
 COPY migrations migrations
 COPY frontend frontend
 COPY app app
-RUN PYTHONPATH=$(echo /opt/inband/lib/python3*/site-packages) hatchling build -t wheel -d wheels \
+RUN export PYTHONPATH=$(echo /opt/inband/lib/python3*/site-packages) \
+    && hatchling build -t wheel -d /build/wheels \
+    && (cd app/simulators && hatchling build -t wheel -d /build/wheels) \
     && /opt/inband/bin/pip install --no-index --no-deps wheels/*.whl
 
 FROM ${PYTHON}

@@ -5,7 +5,9 @@ stand lower in this list; import-linter holds that. Inside a room: tables (colum
 decide in core, save), schemas (JSON), api and pages (routes), wording (sentences), figures (pure: values in, charts out). Rooms meet
 only through each other's queries and actions. frontend/ and migrations/ lie beside this folder, and inside it once installed.
 
-    cli              the command `inband`, and the demonstration plant that talks to the public API like real machines
+    simulators       simulated controls, and the demonstration plant that calls the public API as real machines do;
+                     a distribution of its own
+    cli              the command `inband`
     main.py          create_app(): the wiring
 
     plants           several plants in one installation: their list, their addresses, their overview

@@ -21,10 +21,10 @@ from typing import Any
 
 import httpx
 
-from app.bridge.simulators import simulator_named
-from app.bridge.simulators.model import Model
-from app.cli.bridge import toml_of
 from app.core.ring import SLOTS, Register
+from app.simulators.controls import simulator_named
+from app.simulators.controls.model import Model
+from app.simulators.controls.toml_text import toml_of
 from bench.fleet import Fleet
 from bench.plant import PARAMETERS, TARGET, median, plant
 

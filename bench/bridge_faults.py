@@ -29,11 +29,11 @@ from typing import Any, Protocol
 
 import httpx
 
-from app.bridge.simulators import simulator_named
-from app.bridge.simulators.model import TOLERANCE, Feature, Model
-from app.bridge.simulators.mqtt import start_broker
-from app.cli.bridge import toml_of
 from app.core.ring import SLOTS, Register
+from app.simulators.controls import simulator_named
+from app.simulators.controls.model import TOLERANCE, Feature, Model
+from app.simulators.controls.mqtt import start_broker
+from app.simulators.controls.toml_text import toml_of
 from bench.plant import PARAMETERS, free_port, plant, wait_until_ready
 
 TOOL = 3

@@ -1,6 +1,6 @@
 """Many simulated SINUMERIKs in one process, at a cost that leaves the machine to what is measured.
 
-Each has a model of a machine and an address of its own, and answers as `app.bridge.simulators.opcua` does, from a copy of the
+Each has a model of a machine and an address of its own, and answers as `app.simulators.controls.opcua` does, from a copy of the
 NC that is made every 100 ms; without users, rights and encryption. The answer to a read of the whole block, which is nearly all
 that is asked, is put together by hand: some 30 µs. Everything else goes the usual way through asyncua.
 """
@@ -14,9 +14,9 @@ from asyncua import ua
 from asyncua.common.utils import Buffer, ServiceError
 from asyncua.ua import ua_binary
 
-from app.bridge.simulators.model import Model
-from app.bridge.simulators.opcua import GUD, TICK, Nc, SimulatedSinumerik
 from app.core.ring import SIZE
+from app.simulators.controls.model import Model
+from app.simulators.controls.opcua import GUD, TICK, Nc, SimulatedSinumerik
 
 HEADER: Final = struct.Struct("<3scIIIII")
 """Of a chunk: kind, whether it is the last, size, channel, token, number, request."""

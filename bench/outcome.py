@@ -26,11 +26,11 @@ import httpx
 from app.bridge import control_side, offering, server_side
 from app.bridge.configuration import configuration_from
 from app.bridge.program import link_of
-from app.bridge.simulators import simulator_named
-from app.bridge.simulators.model import OWNERS, SISTERS, UNMAPPED, Feature, Model, Steps, six_tools
 from app.bridge.store import Store
 from app.bridge.unit import Unit, ended
 from app.core.ring import SLOTS, Register, Status
+from app.simulators.controls import simulator_named
+from app.simulators.controls.model import OWNERS, SISTERS, UNMAPPED, Feature, Model, Steps, six_tools
 from bench.plant import PARAMETERS, TARGET, plant
 from inband_client import AsyncClient, Unavailable
 

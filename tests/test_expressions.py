@@ -21,7 +21,7 @@ import app
 from app import HOUSE
 
 ROOM = HOUSE / "app"
-NOT_OURS = ("app.bridge.simulators", "app.cli", "app.client")
+NOT_OURS = ("app.simulators.controls", "app.cli", "app.client")
 """Read what we have written ourselves, or what is typed at the server's own command line."""
 WAYS = {
     "search": "search",

@@ -21,6 +21,7 @@ KITS = {
     "main",
     "memory",
     "settings",
+    "simulators",  # a control is simulated by the words of its kind of bridge
     "web",
     "__main__",
 }

@@ -15,5 +15,4 @@ the public API through ``inband_client`` and imports nothing of the server.
     control_side     the task that talks to one control
     server_side      the task that talks to the server for one machine
     program          all machines together, each with its own tasks
-    simulators       one model of a machine, behind each protocol
 """

@@ -28,7 +28,7 @@ PARTS = (
     "app.cli.proof",
     "app.cli.sbom",
     "app.cli.bridge",
-    "app.cli.demo.cli",
+    "app.cli.simulators",
 )
 
 

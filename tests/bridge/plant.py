@@ -11,10 +11,10 @@ from app.bridge import control_side, guided_test, server_side
 from app.bridge.configuration import Location, Machine, Server
 from app.bridge.links import ControlAway
 from app.bridge.registers import RegisterLink
-from app.bridge.simulators.model import Feature, Model
 from app.bridge.store import Store
 from app.bridge.unit import Unit, ended
 from app.core.ring import Register
+from app.simulators.controls.model import Feature, Model
 from inband_client import AsyncClient
 from tests.conftest import TLS
 from tests.shop import Shop

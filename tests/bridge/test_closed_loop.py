@@ -8,9 +8,9 @@ from pathlib import Path
 
 import pytest
 
-from app.bridge.simulators.model import Feature, Model
 from app.core.ring import Register, Told, Unit
 from app.logs import JsonLines
+from app.simulators.controls.model import Feature, Model
 from tests.bridge.plant import bridge, location, parts, store_in, unit_of, until
 from tests.loops import run
 from tests.shop import Shop

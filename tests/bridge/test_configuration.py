@@ -16,7 +16,7 @@ from app.bridge import kinds
 from app.bridge.configuration import Configuration, ConfigurationError, Location, configuration_from, read_configuration
 from app.bridge.guards import Known, against
 from app.bridge.links import Order
-from app.bridge.simulators.model import Model
+from app.simulators.controls.model import Model
 from tests.bridge.plant import machine
 
 GOOD = """

@@ -12,9 +12,9 @@ from app.bridge import control_side
 from app.bridge.configuration import Location
 from app.bridge.links import ControlAway, LinkError, Misconfigured, Order, Outcome, Position
 from app.bridge.registers import RegisterLink
-from app.bridge.simulators.model import Feature, Model
 from app.bridge.unit import Unit
 from app.core.ring import Register
+from app.simulators.controls.model import Feature, Model
 from tests.bridge.plant import ModelRegisters, controlled, parts, store_in, unit_of, until
 from tests.loops import run
 

@@ -6,7 +6,7 @@ from typing import Any
 
 import pytest
 
-from app.bridge.simulators.mqtt import mosquitto
+from app.simulators.controls.mqtt import mosquitto
 from bench.bridge_faults import KINDS, Campaign
 from tests.conftest import Server
 from tests.shop import unique

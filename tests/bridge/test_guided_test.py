@@ -16,11 +16,11 @@ from app.bridge import guided_test, offset_change
 from app.bridge.configuration import Location, Machine
 from app.bridge.kinds import opcua
 from app.bridge.offset_change import noted
-from app.bridge.simulators.model import Feature, Model
-from app.bridge.simulators.opcua import serve
 from app.bridge.store import Store
 from app.bridge.unit import Guided, Unit
 from app.loop.connections.touch_tests.pages import TOO_SOON
+from app.simulators.controls.model import Feature, Model
+from app.simulators.controls.opcua import serve
 from tests.bridge.kinds.test_opcua import machine as opcua_machine
 from tests.bridge.plant import ModelRegisters, bridge, controlled, parts, store_in, unit_of, until
 from tests.loops import run

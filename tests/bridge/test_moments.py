@@ -9,10 +9,10 @@ from app.bridge.checking import check
 from app.bridge.configuration import configuration_from
 from app.bridge.links import Clock, Received
 from app.bridge.moments import DAY, Prints, learn, learn_ahead, learn_date, measured_at, wrong_date
-from app.bridge.simulators import simulator_named
-from app.bridge.simulators.model import Model
 from app.core.printed_line import Printed
 from app.core.ring import Slot, Unit
+from app.simulators.controls import simulator_named
+from app.simulators.controls.model import Model
 from tests.loops import run
 
 NOW = datetime(2026, 11, 24, 9, 30).astimezone()

@@ -9,8 +9,8 @@ from app.bridge import checking
 from app.bridge.configuration import Machine
 from app.bridge.links import Misconfigured, Order, Position
 from app.bridge.registers import RegisterLink
-from app.bridge.simulators.model import Feature, Model
 from app.core.ring import LAYOUT, Register
+from app.simulators.controls.model import Feature, Model
 from tests.bridge.plant import ModelRegisters, bridge, machine, parts, store_in, unit_of, until
 from tests.bridge.test_checking import findings, table
 from tests.loops import run

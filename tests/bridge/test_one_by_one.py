@@ -6,8 +6,8 @@ import pytest
 
 from app.bridge.links import ControlAway, Order, Position, Received
 from app.bridge.registers import HEADS, SLOTS_AT_ONCE, WATCHED, WATCHED_WITH_MAIL, RegisterLink
-from app.bridge.simulators.model import Model
 from app.core.ring import SLOT_SIZE, Answer, Register
+from app.simulators.controls.model import Model
 from tests.bridge.plant import ModelRegisters, machine
 from tests.loops import run
 

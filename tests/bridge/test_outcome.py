@@ -6,12 +6,12 @@ from typing import Any
 
 import pytest
 
-from app.bridge.simulators.model import OWNERS, UNMAPPED, Steps
-from app.bridge.simulators.mqtt import mosquitto
 from app.core.ring import Told
 from app.jobs.actions import run_jobs
 from app.loop.tools.jobs import JOBS
 from app.loop.tools.untaken import Watch
+from app.simulators.controls.model import OWNERS, UNMAPPED, Steps
+from app.simulators.controls.mqtt import mosquitto
 from bench.outcome import KINDS, WORST, Outcome, Play, Process
 from tests.conftest import TLS, Server
 from tests.loop.tools.test_untaken import age_corrections

@@ -13,8 +13,8 @@ from app.bridge import registers as registers_module
 from app.bridge.configuration import Location
 from app.bridge.links import ControlAway, CountersLost, Decided, Misconfigured, Order, Outcome, Position
 from app.bridge.registers import RegisterLink
-from app.bridge.simulators.model import Feature, Model
 from app.core.ring import SIZE, Answer, Register, Status, Told, Unit
+from app.simulators.controls.model import Feature, Model
 from tests.bridge.plant import ModelRegisters, location, machine, store_in
 from tests.loops import run
 

@@ -16,11 +16,11 @@ import pytest
 from app.bridge import offering, server_side
 from app.bridge.configuration import Server
 from app.bridge.links import Decided, Order, Outcome, Position, Received
-from app.bridge.simulators.model import Feature, Model
 from app.bridge.store import Store
 from app.bridge.unit import Unit, ended
 from app.loop.connections.schemas import HeartbeatIn
 from app.loop.tools.schemas import RejectionIn
+from app.simulators.controls.model import Feature, Model
 from inband_client import AsyncClient, Batch, Conflict, Correction, Decision, Forbidden, Invalid, NotFound, Reason
 from inband_client.calls import plain
 from tests.bridge.plant import location, machine, store_in, unit_of, until

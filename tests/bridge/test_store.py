@@ -13,12 +13,12 @@ from pathlib import Path
 import pytest
 
 from app.bridge.links import Order, Outcome, Position, Received
-from app.bridge.simulators.model import Model
 from app.bridge.slots import reading_of
 from app.bridge.store import Store
 from app.bridge.store_lock import StoreError
 from app.bridge.store_tables import Added
 from app.core.ring import Slot
+from app.simulators.controls.model import Model
 from tests.bridge.plant import machine
 from tests.loops import run
 

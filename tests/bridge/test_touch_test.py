@@ -7,8 +7,8 @@ import pytest
 from app.bridge import offset_change, touch_test
 from app.bridge.offset_change import noted
 from app.bridge.registers import RegisterLink
-from app.bridge.simulators.model import Feature, Model
 from app.core.ring import Unit
+from app.simulators.controls.model import Feature, Model
 from tests.bridge.plant import ModelRegisters, machine, store_in
 from tests.loops import run
 

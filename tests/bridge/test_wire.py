@@ -13,9 +13,9 @@ from app.bridge import server_side
 from app.bridge.certificates import new_pair
 from app.bridge.checking import check
 from app.bridge.configuration import configuration_from
-from app.bridge.simulators.model import Model
 from app.bridge.unit import ended
 from app.bridge.wire import Wire
+from app.simulators.controls.model import Model
 from inband_client import AsyncClient, Unavailable, Untrusted
 from tests.bridge.plant import store_in, unit_of, until
 from tests.loops import run

@@ -19,8 +19,6 @@ from typer.testing import CliRunner
 from app.bridge.configuration import Machine, configuration_from
 from app.bridge.kinds.dprnt import PrintedLink, Settings
 from app.bridge.links import ControlAway, LinkError, Misconfigured, Position, Received
-from app.bridge.simulators.dprnt import PrintingSimulator, serve
-from app.bridge.simulators.model import Model
 from app.bridge.sources import Source
 from app.bridge.store import Store
 from app.bridge.unit import Unit as Tasks
@@ -28,6 +26,8 @@ from app.cli.bridge import bridge as commands
 from app.core.printed_line import LineReader, Printed, line_of
 from app.core.ring import Slot, Unit
 from app.errors import InbandError
+from app.simulators.controls.dprnt import PrintingSimulator, serve
+from app.simulators.controls.model import Model
 from tests.bridge.plant import bridge, controlled, machine, parts, store_in, until
 from tests.loops import in_thread, run
 from tests.shop import Shop

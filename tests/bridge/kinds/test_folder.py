@@ -18,11 +18,11 @@ from app.bridge.file_rows import Fault
 from app.bridge.kinds import folder
 from app.bridge.kinds.folder import Folder
 from app.bridge.links import ControlAway, Decided, Misconfigured, Position, Received, carries_decisions
-from app.bridge.simulators.folder import FolderSimulator
-from app.bridge.simulators.model import Model
 from app.bridge.store import Store
 from app.bridge.unit import Unit
 from app.files.formats.aqdef_values import OF_FIELD as F
+from app.simulators.controls.folder import FolderSimulator
+from app.simulators.controls.model import Model
 from tests.bridge.plant import PATIENCE, controlled, store_in, until
 from tests.loops import run
 

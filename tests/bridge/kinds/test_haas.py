@@ -14,12 +14,12 @@ from app.bridge.configuration import Configuration, Machine, Server, configurati
 from app.bridge.configuration import Store as StoreSettings
 from app.bridge.kinds.haas import HaasRegisters, Settings, link
 from app.bridge.links import ControlAway, LinkError, Misconfigured, Order, Position
-from app.bridge.simulators.haas import FEATURES, HaasSimulator, serve
-from app.bridge.simulators.model import Feature, Model
 from app.bridge.store import Store
 from app.bridge.unit import Unit
 from app.core.ring import Register
 from app.core.ring import Unit as Length
+from app.simulators.controls.haas import FEATURES, HaasSimulator, serve
+from app.simulators.controls.model import Feature, Model
 from tests.bridge.plant import bridge, controlled, location, machine, parts, store_in, until
 from tests.loops import run
 from tests.shop import Shop

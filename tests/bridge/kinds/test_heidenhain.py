@@ -14,13 +14,13 @@ from msgspec.structs import replace
 from app.bridge.configuration import ConfigurationError, Machine, configuration_from
 from app.bridge.kinds.heidenhain import Answered, Settings, TncLink, answer_check, answers_in
 from app.bridge.links import ControlAway, LinkError, Order, Outcome, Position
-from app.bridge.simulators.heidenhain import CORRECTIONS, FEATURES, READINGS, TncSimulator, serve
-from app.bridge.simulators.model import Model
 from app.bridge.store import Store
 from app.bridge.tnc_program import correction_program
 from app.bridge.unit import Unit as Tasks
 from app.core.printed_line import Printed, line_of
 from app.core.ring import Slot, Unit
+from app.simulators.controls.heidenhain import CORRECTIONS, FEATURES, READINGS, TncSimulator, serve
+from app.simulators.controls.model import Model
 from tests.bridge.plant import controlled, machine, parts, store_in, until
 from tests.core.damage import with_neighbours_exchanged, with_one_bit_of_it_changed, with_one_digit_changed
 from tests.loops import run

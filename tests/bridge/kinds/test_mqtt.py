@@ -26,10 +26,10 @@ from app.bridge.links import (
     Received,
     carries_decisions,
 )
-from app.bridge.simulators.model import Model
-from app.bridge.simulators.mqtt import MqttSimulator, free_port, mosquitto, start_broker
 from app.bridge.store import Store
 from app.bridge.unit import Unit
+from app.simulators.controls.model import Model
+from app.simulators.controls.mqtt import MqttSimulator, free_port, mosquitto, start_broker
 from tests.bridge.plant import PATIENCE, bridge, controlled, store_in, until
 from tests.loops import run
 from tests.shop import Shop

@@ -15,9 +15,9 @@ from app.bridge.configuration import ConfigurationError, configuration_from
 from app.bridge.kinds.mtconnect import AgentError, Context, Settings
 from app.bridge.links import Clock, Order, Outcome, Position, Received
 from app.bridge.server_side import heartbeat
-from app.bridge.simulators.model import Model
-from app.bridge.simulators.mtconnect import AgentSimulator
 from app.bridge.unit import Unit
+from app.simulators.controls.model import Model
+from app.simulators.controls.mtconnect import AgentSimulator
 from tests.bridge.plant import machine, store_in, until
 from tests.loops import run
 

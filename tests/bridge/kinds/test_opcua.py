@@ -21,10 +21,10 @@ from app.bridge.kinds import opcua
 from app.bridge.kinds.opcua_answers import doubles_in
 from app.bridge.links import ControlAway, LinkError, Misconfigured, Order, Position
 from app.bridge.registers import RegisterLink
-from app.bridge.simulators.model import Feature, Model
-from app.bridge.simulators.opcua import ADMINISTRATOR, BRIDGE, PASSWORD, Nc, SimulatedSinumerik, serve
 from app.cli.bridge import bridge
 from app.core.ring import SIZE, Register, Unit
+from app.simulators.controls.model import Feature, Model
+from app.simulators.controls.opcua import ADMINISTRATOR, BRIDGE, PASSWORD, Nc, SimulatedSinumerik, serve
 from tests.bridge.plant import until
 from tests.loops import run
 

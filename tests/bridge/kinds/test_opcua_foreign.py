@@ -13,9 +13,9 @@ import pytest
 from asyncua import ua
 
 from app.bridge.kinds.opcua import EDGE_SIZE
-from app.bridge.simulators.model import Feature, Model
-from app.bridge.simulators.opcua import BRIDGE, PASSWORD, serve
 from app.core.ring import SIZE, Register
+from app.simulators.controls.model import Feature, Model
+from app.simulators.controls.opcua import BRIDGE, PASSWORD, serve
 from tests.loops import run
 
 pytestmark = pytest.mark.skipif(importlib.util.find_spec("o6") is None, reason="o6 is not installed (pip install o6)")

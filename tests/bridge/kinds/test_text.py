@@ -17,12 +17,12 @@ from app.bridge.configuration import ConfigurationError, Machine, configuration_
 from app.bridge.kinds.text import TextLines, TextLink
 from app.bridge.links import Misconfigured, Position, Received
 from app.bridge.patterns import Patterns, TooSlow
-from app.bridge.simulators import simulator_named
-from app.bridge.simulators.model import Feature, Model
 from app.bridge.sources import Source
 from app.bridge.store import Store
 from app.bridge.unit import Unit
-from app.cli.bridge import toml_of
+from app.simulators.controls import simulator_named
+from app.simulators.controls.model import Feature, Model
+from app.simulators.controls.toml_text import toml_of
 from tests.bridge.plant import controlled, parts, store_in, until
 from tests.loops import run
 

@@ -9,9 +9,9 @@ import re
 import struct
 
 from app.bridge.kinds.heidenhain import Answered, answer_check
-from app.bridge.simulators.model import Feature, Model
 from app.core.printed_line import Printed, line_of
 from app.core.ring import Mail, Register, Slot, Told, Unit, mail_registers
+from app.simulators.controls.model import Feature, Model
 
 FEATURES = (Feature(tool=3, register="QR31", parameter=31, holds="radius"),)
 READINGS, CORRECTIONS = "TNC:\\inband\\readings.txt", "TNC:\\inband\\corr.h"

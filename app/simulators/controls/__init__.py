@@ -9,14 +9,14 @@ from types import ModuleType
 from typing import Final, Protocol
 
 SIMULATORS: Final[dict[str, str]] = {
-    "dprnt": "app.bridge.simulators.dprnt",
-    "folder": "app.bridge.simulators.folder",
-    "haas": "app.bridge.simulators.haas",
-    "heidenhain": "app.bridge.simulators.heidenhain",
-    "mtconnect": "app.bridge.simulators.mtconnect",
-    "mqtt": "app.bridge.simulators.mqtt",
-    "opcua": "app.bridge.simulators.opcua",
-    "text": "app.bridge.simulators.text",
+    "dprnt": "app.simulators.controls.dprnt",
+    "folder": "app.simulators.controls.folder",
+    "haas": "app.simulators.controls.haas",
+    "heidenhain": "app.simulators.controls.heidenhain",
+    "mtconnect": "app.simulators.controls.mtconnect",
+    "mqtt": "app.simulators.controls.mqtt",
+    "opcua": "app.simulators.controls.opcua",
+    "text": "app.simulators.controls.text",
 }
 """Kinds that can be simulated, and the module of each."""
 

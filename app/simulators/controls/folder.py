@@ -11,8 +11,8 @@ import tempfile
 from datetime import datetime
 from pathlib import Path
 
-from app.bridge.simulators.model import Model
 from app.core.ring import Register, Slot, Unit
+from app.simulators.controls.model import Model
 
 AT = "the folder that files are written into; a new one if left out"
 HALVED, TWICE = 5, 7  # of so many files one

@@ -12,12 +12,12 @@ from pathlib import Path
 from sqlalchemy.orm import Session
 
 from app.access import actions, queries
-from app.cli.demo import plant
 from app.db.engine import Database
 from app.errors import InbandError
 from app.language.i18n import _
 from app.loop.machines import queries as machines
 from app.settings import Settings
+from app.simulators.demo import plant
 
 PEOPLE = {"engineer": "engineer", "operator": "operator", "admin": "admin"}  # name and role
 ACTOR = "inband demo"

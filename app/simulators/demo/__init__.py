@@ -2,11 +2,9 @@
 
     plant.py       which machines, tools and features there are, and how a feature answers to its tool's offset
     simulation.py  the physics: pure, seeded, without a clock; it knows nothing of the server
-    client.py      the public REST API as a machine's gateway would call it, patient when the server is unreachable
     running.py     one machine in its loop: cut, measure, report, fetch corrections, apply them, confirm
     andon.py       the webhook that is notified
     people.py      who signs in, and the simulated operator who steps in when nobody else does
-    cli.py         the command `inband demo`
 
 It talks to the server only through its public API: what it can do, a real machine can do.
 """

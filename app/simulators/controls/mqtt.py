@@ -17,10 +17,10 @@ from typing import Any
 
 import aiomqtt
 
-from app.bridge.simulators import NoPlace
-from app.bridge.simulators.model import Feature, Model
 from app.bridge.unit import ended
 from app.core.ring import Answer, Mail, Register, Slot, Status, Told, Unit, mail_registers
+from app.simulators.controls import NoPlace
+from app.simulators.controls.model import Feature, Model
 
 AT = "the broker as host:port; mosquitto is started if left out"
 AGAIN = 3.0  # s until what was not stored is sent again

@@ -3,10 +3,10 @@
 Above the sizes of a part stand a title and the part's number; nothing has a check sum, and nothing is printed again.
 """
 
-from app.bridge.simulators.dprnt import PrintingSimulator
-from app.bridge.simulators.model import Feature, Model
 from app.core.printed_line import DECIMALS
 from app.core.ring import Slot, Unit
+from app.simulators.controls.dprnt import PrintingSimulator
+from app.simulators.controls.model import Feature, Model
 
 FEATURES = (Feature(),)
 LINES = (r"^PART +(?P<part>\S+)", r"^(?P<characteristic>D\d+) .*ACTUAL +(?P<measured>[-\d.]+)")

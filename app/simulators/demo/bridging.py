@@ -10,10 +10,10 @@ from typing import Any
 
 from app.bridge import program
 from app.bridge.configuration import Configuration, configuration_from
-from app.bridge.simulators import haas
-from app.bridge.simulators.model import Feature, Model, live
 from app.bridge.store import Store
-from app.cli.demo.installing import KEY_NAME, new_key
+from app.simulators.controls import haas
+from app.simulators.controls.model import Feature, Model, live
+from app.simulators.demo.installing import KEY_NAME, new_key
 from inband_client import Client, NotFound
 
 log = logging.getLogger(__name__)

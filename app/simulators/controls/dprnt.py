@@ -9,9 +9,9 @@ import contextlib
 import os
 import tty
 
-from app.bridge.simulators.model import Feature, Model
 from app.core.printed_line import DECIMALS, END, START, Printed, check_of
 from app.core.ring import SLOTS, Register, Slot, Unit
+from app.simulators.controls.model import Feature, Model
 
 FEATURES = (Feature(),)
 TICK = 0.01  # s

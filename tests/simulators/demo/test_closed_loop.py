@@ -15,13 +15,13 @@ from typing import Any
 
 import pytest
 
-from app.cli.demo import people, plant, running
-from app.cli.demo.installing import lines, set_up
-from app.cli.demo.running import Line, Pace
-from app.cli.demo.simulation import Machine
 from app.db.engine import Database
 from app.errors import InbandError
 from app.settings import Settings
+from app.simulators.demo import people, plant, running
+from app.simulators.demo.installing import lines, set_up
+from app.simulators.demo.running import Line, Pace
+from app.simulators.demo.simulation import Machine
 from inband_client import Client
 from tests.conftest import Server
 from tests.shop import Shop, unique

@@ -9,8 +9,8 @@ import contextlib
 import re
 
 from app.bridge.kinds.haas import DATE, PARAMETERS, TIME_OF_DAY
-from app.bridge.simulators.model import Feature, Model
 from app.core.ring import SIZE, Unit
+from app.simulators.controls.model import Feature, Model
 
 FEATURES = (Feature(register="wear_length", parameter=PARAMETERS["wear_length"]),)
 CONNECTIONS = 2

@@ -12,9 +12,9 @@ from app.cli.serve import Host, LogForm, LogLevel, Port, run
 from app.language.i18n import _
 
 if TYPE_CHECKING:
-    from app.cli.demo.running import Line
     from app.db.engine import Database
     from app.settings import Settings
+    from app.simulators.demo.running import Line
 
 log = logging.getLogger(__name__)
 
@@ -48,7 +48,7 @@ def demo(
     log_format: LogForm = None,
 ) -> None:
     """Run the server with a simulated plant: three lathes and a milling machine that call its public API."""
-    from app.cli.demo import people
+    from app.simulators.demo import people
 
     os.environ.setdefault("INBAND_WEBHOOK_NETWORKS", "127.0.0.1/32")  # its andon listens on this computer
     settings = settings_from(
@@ -66,7 +66,7 @@ def demo(
     def beside(settings: "Settings") -> None:
         start(settings, plant_key[0], seed, speed, past)
         if bridge:
-            from app.cli.demo import bridging
+            from app.simulators.demo import bridging
 
             url = f"http://{_here(settings.host)}:{settings.port}"
             bridging.start(url, plant_key[0], speed, settings.data_dir / "demo-bridge")
@@ -76,7 +76,7 @@ def demo(
 
 def start(settings: "Settings", key: str, seed: int, speed: float, past: float | None = None) -> None:
     """Set the plant up and let every machine run in a thread of its own until the server's process ends."""
-    from app.cli.demo.installing import lines
+    from app.simulators.demo.installing import lines
 
     ending = threading.Event()
     simulated = lines(f"http://{_here(settings.host)}:{settings.port}", key, seed, ending)
@@ -91,7 +91,7 @@ def start(settings: "Settings", key: str, seed: int, speed: float, past: float |
 
 
 def _run(line: "Line", speed: float, past: float | None) -> None:
-    from app.cli.demo.installing import run_line
+    from app.simulators.demo.installing import run_line
     from inband_client import ProblemError, Stopped
 
     try:

@@ -4,8 +4,8 @@ from dataclasses import replace
 
 import pytest
 
-from app.cli.demo import plant, turning
-from app.cli.demo.installing import set_up
+from app.simulators.demo import plant, turning
+from app.simulators.demo.installing import set_up
 from inband_client import Client
 from tests.conftest import Server
 

@@ -41,8 +41,8 @@ from app.bridge.kinds.opcua import (
     SERIAL,
     node_of,
 )
-from app.bridge.simulators.model import Model
 from app.core.ring import SIZE, Unit
+from app.simulators.controls.model import Model
 
 TICK: Final = 0.1  # s
 SESSIONS: Final = 5

@@ -12,8 +12,8 @@ from typing import NamedTuple
 from urllib.parse import parse_qs, unquote, urlsplit
 from xml.sax.saxutils import escape
 
-from app.bridge.simulators.model import Model
 from app.core.ring import Register
+from app.simulators.controls.model import Model
 
 BUFFER = 64
 TICK = 0.05  # s

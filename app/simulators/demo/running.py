@@ -14,7 +14,7 @@ from datetime import UTC, datetime, timedelta
 from random import Random
 from typing import Any
 
-from app.cli.demo.simulation import Machine, Probe
+from app.simulators.demo.simulation import Machine, Probe
 from inband_client import Client, Conflict, Correction, ProblemError, Reading, Stopped
 
 log = logging.getLogger(__name__)

@@ -17,7 +17,7 @@ from dataclasses import dataclass, field
 from math import exp
 from random import Random
 
-from app.cli.demo import plant
+from app.simulators.demo import plant
 
 WARM_UP = 45 * 60.0  # s, time constant while cutting
 COOL_DOWN = 80 * 60.0

@@ -2,11 +2,11 @@ from dataclasses import replace
 
 import pytest
 
-from app.cli.demo import plant
-from app.cli.demo.simulation import Machine, Probe
 from app.core.decision.decide import LoopState, decide
 from app.core.decision.step import deviation_of
 from app.core.parameters import read
+from app.simulators.demo import plant
+from app.simulators.demo.simulation import Machine, Probe
 
 
 def story(seed: int, parts: int = 300) -> list[tuple[str, float, float, list[list[float]] | None]]:

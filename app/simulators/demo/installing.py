@@ -5,9 +5,9 @@ from collections.abc import Sequence
 from datetime import UTC, datetime
 from random import Random
 
-from app.cli.demo import andon, calibrating, plant, touching, turning
-from app.cli.demo.running import Line, Pace
-from app.cli.demo.simulation import Machine
+from app.simulators.demo import andon, calibrating, plant, touching, turning
+from app.simulators.demo.running import Line, Pace
+from app.simulators.demo.simulation import Machine
 from inband_client import Client, NotFound
 
 KEY_NAME = "demonstration plant"
