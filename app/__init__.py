@@ -13,6 +13,7 @@ only through each other's queries and actions. frontend/ and migrations/ lie bes
     plants           several plants in one installation: their list, their addresses, their overview
 
     views            pages that compose several rooms
+        help             the documents of docs/ as pages of the program
         licences         what runs here of others, with its terms; the bill of materials
         reports          a characteristic and a period as page, PDF, spreadsheet; many at once in the background
         search           readings and parts across characteristics, one field for everything

@@ -102,6 +102,7 @@ from app.views.characteristic import capability_pages, figures_api
 from app.views.characteristic import pages as characteristic_pages
 from app.views.compare import api as compare
 from app.views.compare import pages as compare_pages
+from app.views.help import pages as help_pages
 from app.views.licences import pages as licence_pages
 from app.views.overview import api as overview
 from app.views.overview import pages as overview_pages
@@ -217,6 +218,7 @@ ROUTERS: tuple[APIRouter, ...] = (
     setup_pages.router,
     import_pages.router,
     proof_pages.router,
+    help_pages.router,
     licence_pages.router,
     report_pages.router,
     report_job_pages.router,

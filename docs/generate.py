@@ -12,8 +12,10 @@ from typing import Any, get_args
 
 from app import HOUSE
 from app.core.parameters import FIELDS, Field, FieldKind
+from app.core.spc.rules import RULES
 from app.errors import InbandError
 from app.loop.characteristics import wording
+from app.loop.summaries import wording as words
 from app.settings import Settings, variable_of
 
 PART = re.compile(r"(<!-- generated: ([a-z-]+) -->\n).*?(<!-- end -->)", re.DOTALL)
@@ -150,6 +152,17 @@ def _parameters() -> str:
     return _table(("R", "name", "meaning", "value", "usual", "default"), rows)
 
 
+# --- run rules
+
+
+def _rules() -> str:
+    rows = (
+        (words.rule_name(name), f"{words.rule(rule)} {words.hint(name)}", "Nelson 1984; Western Electric 1956")
+        for name, rule in RULES.items()
+    )
+    return _table(("term", "meaning", "source"), rows)
+
+
 # --- errors
 
 
@@ -202,6 +215,7 @@ PARTS: dict[str, Callable[[], str]] = {
     "settings": _settings,
     "parameters": _parameters,
     "errors": _errors,
+    "rules": _rules,
 }
 
 

@@ -22,9 +22,11 @@ from app.language import i18n, numbers, times
 from app.web import period, states, theme
 from app.web.assets import Assets
 from app.web.doors import door_of, machine_of, search_words, way_to
+from app.web.help_ways import help_of
 from app.web.page_queries import kept_period, said_period
 from app.web.paging import address
 from app.web.request_log import note_reason
+from app.web.terms import term_of
 
 TEMPLATE_DIR = HOUSE / "frontend" / "templates"
 THEME_COOKIE = "inband_theme"
@@ -73,6 +75,8 @@ def environment() -> Environment:
     env.globals.update(
         address=address,
         door_of=door_of,
+        help_of=help_of,
+        term_of=term_of,
         way_to=way_to,
         search_words=search_words,
         asset=assets().url,

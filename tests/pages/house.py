@@ -194,6 +194,8 @@ PAGES = {
     "/api/docs": ["/api/docs"],
     "/compare": ["/compare", "/compare?of={characteristic}&by=version"],
     "/proof": ["/proof"],
+    "/help": ["/help"],
+    "/help/{name:path}": ["/help/how-to/run-rules", "/help/reference/glossary"],
     "/licences": ["/licences"],
     "/licences/{library}": ["/licences/psycopg"],
 }

@@ -71,13 +71,14 @@ function equip(table) {
     const button = document.createElement("button");
     button.type = "button";
     button.className = "sorts";
-    button.append(...head.childNodes);
+    const term = head.querySelector("[data-term]"); // a link beside the button, not in it
+    button.append(...[...head.childNodes].filter((node) => node !== term));
     button.addEventListener("click", () => {
       const descending = head.getAttribute("aria-sort") === "ascending";
       sort(table, column, descending);
       remember(table, { column, descending });
     });
-    head.append(button);
+    head.prepend(button);
   }
   if (before.column !== undefined) sort(table, before.column, before.descending);
   if (table.dataset.filter && table.tBodies[0].rows.length >= LONG) {
