@@ -26,7 +26,12 @@ class PersonChange(Body):
     """Changes of a person; what is left out stays."""
 
     role: Role | None = None
-    disabled: bool | None = None
+    disabled: Annotated[
+        bool | None,
+        Field(
+            description="true: they may not sign in any more, and their browser sessions end; false: they may again."
+        ),
+    ] = None
 
 
 class InvitationIn(Body):
@@ -39,7 +44,7 @@ class InvitationOut(BaseModel):
     """A one-time link, shown only this once; it works for seven days."""
 
     role: Role
-    url: str
+    url: Annotated[str, Field(description="The address to open; the first who does becomes the person.")]
 
 
 class RoleKeyIn(Body):

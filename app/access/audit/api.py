@@ -25,11 +25,13 @@ class AuditEntryOut(BaseModel):
     actor: str = Field(description="The name as it was then.")
     person_id: int | None = Field(description="The person's number; null for keys, the system and the command line.")
     key_id: int | None = Field(description="The key's number; null for people, the system and the command line.")
-    action: str
-    subject: str
-    before: dict[str, Any] | None
-    after: dict[str, Any] | None
-    why: str | None
+    action: Annotated[str, Field(description="What was done, such as `parameters changed`.")]
+    subject: Annotated[str, Field(description="To what, as kind and key, such as `characteristic/shaft-d40`.")]
+    before: Annotated[
+        dict[str, Any] | None, Field(description="What was changed, as it was before; null where there was nothing.")
+    ]
+    after: Annotated[dict[str, Any] | None, Field(description="The same as it is since; null where nothing is left.")]
+    why: Annotated[str | None, Field(description="The reason that was given, if one was.")]
     device_id: int | None = Field(
         description="The station device where the person identified themselves; null for what was done elsewhere."
     )

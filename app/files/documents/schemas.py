@@ -1,6 +1,7 @@
 """A report as JSON. Numbers in the unit that is beside them; lengths as people read them, in µm and mm."""
 
 from datetime import datetime
+from typing import Annotated
 
 from pydantic import BaseModel, Field
 
@@ -11,7 +12,7 @@ class ReportValueOut(BaseModel):
     """One value: the plain number or text, its unit, and the words of the page."""
 
     value: float | int | str | None = Field(description="A number in `unit`; moments in RFC 3339; else the text.")
-    unit: str
+    unit: str = Field(description="Of `value`; empty: it has none.")
     text: str
 
     @classmethod
@@ -24,12 +25,12 @@ class ReportValueOut(BaseModel):
 class FactOut(ReportValueOut):
     """A value with its name and R number; `low` and `high` are the ends of its confidence interval."""
 
-    key: str
+    key: str = Field(description="A stable name, for programs.")
     name: str
-    code: str
-    note: str
-    low: float | int | None = None
-    high: float | int | None = None
+    code: str = Field(description="Its R number; empty: it has none.")
+    note: str = Field(description="What belongs to it, in words; may be empty.")
+    low: Annotated[float | int | None, Field(description="Low end of its confidence interval, in `unit`.")] = None
+    high: Annotated[float | int | None, Field(description="High end of its confidence interval, in `unit`.")] = None
 
     @classmethod
     def of_fact(cls, fact: Fact, report: Report) -> "FactOut":
@@ -48,27 +49,27 @@ class FactOut(ReportValueOut):
 class ColumnOut(BaseModel):
     """A column of a table."""
 
-    key: str
+    key: str = Field(description="A stable name, for programs.")
     name: str
 
 
 class ReportTableOut(BaseModel):
     """Rows of values, one for each column; `more` rows are left out, the oldest."""
 
-    columns: list[ColumnOut]
-    rows: list[list[ReportValueOut]]
-    more: int
+    columns: list[ColumnOut] = Field(description="The columns, from left to right.")
+    rows: list[list[ReportValueOut]] = Field(description="The rows, each with a value for each column.")
+    more: int = Field(description="Number of rows that are left out, the oldest.")
 
 
 class SectionOut(BaseModel):
     """One part of the report."""
 
-    key: str
-    title: str
-    sentences: list[str]
+    key: str = Field(description="A stable name, for programs.")
+    title: str = Field(description="Its heading.")
+    sentences: list[str] = Field(description="What it says, in words.")
     warnings: list[str] = Field(description="What the numbers should not be read without.")
-    facts: list[FactOut]
-    table: ReportTableOut | None
+    facts: list[FactOut] = Field(description="Its numbers.")
+    table: ReportTableOut | None = Field(description="Its table; null: it has none.")
     charts: list[str] = Field(description="Charts shown here on the page and in the PDF.")
 
     @classmethod
@@ -98,13 +99,13 @@ class ReportOut(BaseModel):
     characteristic: str
     name: str
     machine: str
-    part: str
-    period: str
-    timezone: str
-    made_at: datetime
+    part: str = Field(description="What the characteristic belongs to; empty: it is not said.")
+    period: str = Field(description="The readings that it is about, in words.")
+    timezone: str = Field(description="In which moments are written.")
+    made_at: datetime = Field(description="When the report was made.")
     warnings: list[str] = Field(description="Heading above everything else.")
-    head: list[FactOut]
-    sections: list[SectionOut]
+    head: list[FactOut] = Field(description="What it is about: characteristic, machine, tolerance, period.")
+    sections: list[SectionOut] = Field(description="Its sections, in the order of the page.")
 
     @classmethod
     def of(cls, report: Report) -> "ReportOut":

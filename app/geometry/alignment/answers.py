@@ -30,17 +30,17 @@ TEXT = "; INBAND ALIGNMENT 7 FOR MILL-1\n; …\n$P_UIFR[1]=CTRANS(X,-306.06,Y,-1
 class Shift(BaseModel):
     """Shift of the part's origin, mm."""
 
-    a: float
-    b: float
-    c: float
+    a: Annotated[float, Field(description="Along X, mm.")]
+    b: Annotated[float, Field(description="Along Y, mm.")]
+    c: Annotated[float, Field(description="Along Z, mm.")]
 
 
 class Angles(BaseModel):
     """As a frame takes them: about Z, then the new Y, then the new X; degrees."""
 
-    x: float
-    y: float
-    z: float
+    x: Annotated[float, Field(description="About the new X.")]
+    y: Annotated[float, Field(description="About the new Y.")]
+    z: Annotated[float, Field(description="About Z, which comes first.")]
 
 
 class Turns(BaseModel):
@@ -48,23 +48,23 @@ class Turns(BaseModel):
 
     model_config = ConfigDict(serialize_by_alias=True, populate_by_name=True)
 
-    lambda_: Annotated[float, Field(alias="lambda")]
-    beta: float
-    gamma: float
+    lambda_: Annotated[float, Field(description="About X, degrees.", alias="lambda")]
+    beta: Annotated[float, Field(description="About Y, degrees.")]
+    gamma: Annotated[float, Field(description="About Z, degrees.")]
 
 
 class Condition(BaseModel):
     """Quality of the layout: how well the probed points hold the part."""
 
-    value: float
+    value: Annotated[float, Field(description="Largest by smallest singular value of the layout; 1 is best.")]
     text: Annotated[str, Field(description="For people.")]
 
 
 class Advice(BaseModel):
     """One touch more that would help most."""
 
-    place: list[float]
-    normal: list[float]
+    place: Annotated[list[float], Field(description="Where to touch, X Y Z, mm.")]
+    normal: Annotated[list[float], Field(description="Normal of the surface there.")]
     gain: Annotated[float | None, Field(description="How many times as certain the least certain motion becomes.")]
     text: Annotated[str, Field(description="For people.")]
 
@@ -72,7 +72,7 @@ class Advice(BaseModel):
 class RotaryTableOut(BaseModel):
     """Command for a rotary table."""
 
-    axis: str
+    axis: Annotated[str, Field(description="The table's axis.")]
     turn: Annotated[float, Field(description="Of the part about Z, counter-clockwise positive.")]
     position: Annotated[float, Field(description="To command.")]
     shift: Annotated[Shift, Field(description="What is left for the frame after the table has turned.")]
@@ -84,8 +84,10 @@ class AlignmentOut(BaseModel):
 
     id: int
     machine: str
-    kind: Kind
-    method: MethodName
+    kind: Annotated[
+        Kind, Field(description="What was touched: points of any surfaces, two points, two holes, or a pallet.")
+    ]
+    method: Annotated[MethodName, Field(description="By which the motion was computed.")]
     name: str | None
     part: str | None
     shift: Shift
@@ -93,23 +95,25 @@ class AlignmentOut(BaseModel):
     turns: Turns
     matrix: Annotated[list[list[float]], Field(description="4 × 4: a nominal point r lies at matrix · (r, 1).")]
     uncertainty: Annotated[dict[str, float], Field(description="By unknown, 95 %; needs `repeatability`.")]
-    touches: list[dict[str, Any]]
+    touches: Annotated[list[dict[str, Any]], Field(description="What was touched, as it was sent.")]
     deviations: Annotated[list[float], Field(description="Actual less nominal along the normal.")]
     residuals: Annotated[list[float], Field(description="What is left of each touch.")]
     leverage: Annotated[list[float], Field(description="1: nothing checks this touch.")]
-    condition: Condition | None
+    condition: Annotated[
+        Condition | None, Field(description="Quality of the layout of the touches; null: it has none.")
+    ]
     misfits: Annotated[
         list[list[int]],
         Field(description="Touches that do not fit, from 1; several together where any of them may be the one."),
     ]
-    weakest: str | None
-    advice: Advice | None
+    weakest: Annotated[str | None, Field(description="The least certain motion, in words; null: there is none.")]
+    advice: Annotated[Advice | None, Field(description="One touch more that would help most; null: none is needed.")]
     difference: Annotated[
         float | None,
         Field(description="How far small angles would have put a touch from where the exact solution does."),
     ]
     off: Annotated[float | None, Field(description="Of two holes: distance found less nominal distance.")]
-    table: RotaryTableOut | None
+    table: Annotated[RotaryTableOut | None, Field(description="Command for the rotary table; null: there is none.")]
     warnings: Warnings
     acknowledged: Acknowledged
     program: Annotated[
@@ -119,15 +123,17 @@ class AlignmentOut(BaseModel):
             "acknowledged it begins with a block that stops the control."
         ),
     ]
-    readings: list[PushedOut]
+    readings: Annotated[list[PushedOut], Field(description="Its results as readings of characteristics.")]
     pallet: Annotated[int | None, Field(description="The alignment of the pallet that this is composed with.")]
-    part_on_pallet: int | None
+    part_on_pallet: Annotated[
+        int | None, Field(description="The alignment of the part on its pallet that this is composed with.")
+    ]
     given: Annotated[dict[str, Any], Field(description="All it was computed from.")]
-    aligned_at: datetime
+    aligned_at: Annotated[datetime, Field(description="When the part was touched.")]
     received_at: datetime
     by: str
     key: str | None
-    recomputed_from: int | None
+    recomputed_from: Annotated[int | None, Field(description="The alignment whose touches were computed again.")]
 
 
 def turned_table(alignment: Alignment) -> Turned | None:

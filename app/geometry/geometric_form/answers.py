@@ -18,8 +18,8 @@ class FormVerdictOut(BaseModel):
     """Verdict on the tolerance. sure: the limit lies outside the uncertainty, which is known."""
 
     code: Annotated[str, Field(description="good, good_unsure, bad_unsure or bad.")]
-    good: bool
-    sure: bool
+    good: Annotated[bool, Field(description="The deviation is within the tolerance.")]
+    sure: Annotated[bool, Field(description="The limit lies outside the uncertainty, which is known.")]
     text: Annotated[str, Field(description="For people.")]
 
 
@@ -29,8 +29,8 @@ class FormDeviationOut(BaseModel):
     method: Annotated[
         str, Field(description="minimum_zone, least_squares, printed, inscribed (MIC), circumscribed (MCC).")
     ]
-    value: float
-    uncertainty: float | None
+    value: Annotated[float, Field(description="The deviation, mm.")]
+    uncertainty: Annotated[float | None, Field(description="Expanded, k = 2, mm; null where it cannot be found.")]
 
 
 class SuspectOut(BaseModel):
@@ -41,8 +41,8 @@ class SuspectOut(BaseModel):
     touch: Annotated[int, Field(description="Counted from 1.")]
     off: Annotated[float, Field(description="How far off, positive outside or above.")]
     t: Annotated[float, Field(description="Its studentized residual, which is beyond `limit`.")]
-    limit: float
-    given: list[float]
+    limit: Annotated[float, Field(description="Largest studentized residual that chance explains.")]
+    given: Annotated[list[float], Field(description="The touch as it was sent, mm.")]
     nearest: Annotated[list[float], Field(description="The next point that would fit.")]
     alone: Annotated[
         list[float | None],
@@ -57,8 +57,8 @@ class FormReadingOut(BaseModel):
     """The reading that the result becomes; without a number it is on its way."""
 
     characteristic: str
-    sequence: int | None
-    refused: str | None
+    sequence: Annotated[int | None, Field(description="Number of the reading; null: it is on its way.")]
+    refused: Annotated[str | None, Field(description="Why it became no reading.")]
 
 
 class FormOut(BaseModel):
@@ -66,15 +66,15 @@ class FormOut(BaseModel):
 
     id: int
     machine: str
-    feature: str
-    kind: str
+    feature: Annotated[str, Field(description="Name of the feature.")]
+    kind: Annotated[str, Field(description="What was evaluated, such as `roundness`.")]
     method: Annotated[str, Field(description="By which the verdict goes.")]
     value: Annotated[float, Field(description="The deviation by that method.")]
     uncertainty: Annotated[float | None, Field(description="Expanded, k = 2; from the probe's repeatability.")]
-    tolerance: float | None
-    verdict: FormVerdictOut | None
-    values: list[FormDeviationOut]
-    suspects: list[SuspectOut]
+    tolerance: Annotated[float | None, Field(description="It is held against, mm; null: nothing was.")]
+    verdict: Annotated[FormVerdictOut | None, Field(description="null without a tolerance.")]
+    values: Annotated[list[FormDeviationOut], Field(description="The deviation by each method.")]
+    suspects: Annotated[list[SuspectOut], Field(description="Touches that do not belong to what the others agree on.")]
     warnings: Warnings
     tested: Annotated[bool, Field(description="There were touches enough to tell a bad one.")]
     corrected: Annotated[
@@ -82,7 +82,7 @@ class FormOut(BaseModel):
     ]
     details: Annotated[dict[str, Any], Field(description="Centres, diameters, axes, residuals.")]
     given: Annotated[dict[str, Any], Field(description="Touches and datum as they came.")]
-    repeatability: float | None
+    repeatability: Annotated[float | None, Field(description="Standard deviation of one touch, mm; null: not known.")]
     part: str | None
     measured_at: datetime
     received_at: datetime
@@ -90,8 +90,10 @@ class FormOut(BaseModel):
     key: str | None
     engine: Annotated[int, Field(description="Version of the evaluation.")]
     evaluation: Annotated[int, Field(description="How often it was evaluated; the newest counts.")]
-    evaluated_at: datetime
-    reading: FormReadingOut | None
+    evaluated_at: Annotated[datetime, Field(description="When it was evaluated last.")]
+    reading: Annotated[
+        FormReadingOut | None, Field(description="The reading that it becomes; null: it serves no characteristic.")
+    ]
 
 
 def form_out(row: FormRow, reading: PushedResult | None = None) -> FormOut:

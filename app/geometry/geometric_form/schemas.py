@@ -50,8 +50,14 @@ class FormSectionIn(Body):
 class TouchedIn(Body):
     """Probed points of a datum: a bore or shaft in sections, or a surface in points."""
 
-    sections: Annotated[list[FormSectionIn], Field(default_factory=list, max_length=MOST_SECTIONS)]
-    points: Annotated[list[Point], Field(default_factory=list, max_length=MOST_TOUCHES)]
+    sections: Annotated[
+        list[FormSectionIn],
+        Field(description="Of a bore or shaft: its sections.", default_factory=list, max_length=MOST_SECTIONS),
+    ]
+    points: Annotated[
+        list[Point],
+        Field(description="Of a surface: its points, X Y Z, mm.", default_factory=list, max_length=MOST_TOUCHES),
+    ]
 
 
 class FormIn(Body):

@@ -20,23 +20,27 @@ Status = Literal["refused", "to_confirm", "confirmed", "measured", "entered"]
 class EstimateOut(BaseModel):
     """A value with its standard deviation; none where the run does not state it."""
 
-    value: float
-    deviation: float | None
+    value: Annotated[float, Field(description="The value, mm or degrees as its field says.")]
+    deviation: Annotated[
+        float | None, Field(description="Its standard deviation; null where the run does not state it.")
+    ]
 
 
 class PositionOut(BaseModel):
     """One position: deviations X Y Z before (red in the diagram) and after (green)."""
 
-    angle: float
+    angle: Annotated[float, Field(description="Of the axis, degrees.")]
     approach: Annotated[int, Field(description="1 from the negative side, −1 from the positive, 0 not said.")]
-    measured: list[float | None]
-    optimised: list[float | None]
+    measured: Annotated[list[float | None], Field(description="Deviation X Y Z before, mm; null: not stated.")]
+    optimised: Annotated[
+        list[float | None], Field(description="Deviation X Y Z that the errors leave, mm; null: not stated.")
+    ]
 
 
 class AxisOut(BaseModel):
     """One rotary axis, with everything that the control's protocol has."""
 
-    axis: AxisName
+    axis: Annotated[AxisName, Field(description="Letter of the axis.")]
     carries: Annotated[str | None, Field(description="table or head; none where the control has reckoned it.")] = None
     errors: Annotated[
         dict[str, EstimateOut],
@@ -45,30 +49,35 @@ class AxisOut(BaseModel):
             "is: what has to be added to its kinematics."
         ),
     ]
-    backlash: EstimateOut | None
+    backlash: Annotated[
+        EstimateOut | None, Field(description="Of the axis, degrees; null where it was not approached from both sides.")
+    ]
     scatter_before: Annotated[float | None, Field(description="Q141 to Q143: rms of the deviations.")]
     scatter_after: Annotated[float | None, Field(description="Q144 to Q146: rms of what the errors leave.")]
-    greatest_before: float | None
-    greatest_after: float | None
+    greatest_before: Annotated[float | None, Field(description="Largest deviation before, mm.")]
+    greatest_after: Annotated[float | None, Field(description="Largest deviation that the errors leave, mm.")]
     mean_error: Annotated[float | None, Field(description="Mean positioning error: mean length of what is left.")]
     angle_error: Annotated[float | None, Field(description="The largest that is left, as an angle about the axis.")]
     radius: Annotated[float | None, Field(description="Of the measuring circle.")]
-    start_angle: float | None
-    end_angle: float | None
-    points: int | None
-    incidence: float | None
-    angles: list[float]
-    ball: list[float] | None
+    start_angle: Annotated[float | None, Field(description="Angle of the first position, degrees.")]
+    end_angle: Annotated[float | None, Field(description="Angle of the last position, degrees.")]
+    points: Annotated[int | None, Field(description="Number of positions.")]
+    incidence: Annotated[float | None, Field(description="Where it stood while the other axes were measured, degrees.")]
+    angles: Annotated[list[float], Field(description="Angles of the positions, degrees, in the order of the control.")]
+    ball: Annotated[list[float] | None, Field(description="Nominal centre of the ball at the angle 0, X Y Z, mm.")]
     shift: Annotated[list[EstimateOut] | None, Field(description="How far the ball lies from its nominal centre.")]
     correction: Annotated[
         list[float] | None, Field(description="Where the axis has to go, X Y Z; none where the run does not say it.")
     ]
-    position_before: list[float] | None
-    position_after: list[float] | None
-    positions: list[PositionOut]
-    arc: float | None
-    condition: float | None
-    freedom: int | None
+    position_before: Annotated[list[float] | None, Field(description="Where the control had the axis, X Y Z, mm.")]
+    position_after: Annotated[list[float] | None, Field(description="Where it lies by this run, X Y Z, mm.")]
+    positions: Annotated[list[PositionOut], Field(description="Every position, with the deviations before and after.")]
+    arc: Annotated[float | None, Field(description="The smallest arc that holds the positions, degrees.")]
+    condition: Annotated[
+        float | None,
+        Field(description="Condition of the least squares, largest by smallest singular value; 1 is best."),
+    ]
+    freedom: Annotated[int | None, Field(description="Degrees of freedom that are left to judge by.")]
     noise: Annotated[float | None, Field(description="Standard deviation of one coordinate of a centre.")]
 
 
@@ -90,10 +99,10 @@ class DecidedOut(BaseModel):
 class RunOut(BaseModel):
     """A run of the preset compensation. Lengths in mm, angles in degrees."""
 
-    run: int
+    run: Annotated[int, Field(description="Number of the run.")]
     machine: str
     form: Annotated[str, Field(description="touches, centres, results or protocol.")]
-    head: str | None
+    head: Annotated[str | None, Field(description="The interchangeable head that was in; null: it is not said.")]
     program: Annotated[str | None, Field(description="NC program; sent, or read from the protocol.")] = None
     tool: Annotated[str | None, Field(description="Name of the touch probe.")] = None
     kinematics: Annotated[str | None, Field(description="Name of the active kinematics.")] = None
@@ -110,7 +119,7 @@ class RunOut(BaseModel):
     received_at: datetime
     by: str
     key: str | None
-    axes: list[AxisOut]
+    axes: Annotated[list[AxisOut], Field(description="Every axis that was measured.")]
     offsets: Annotated[dict[str, float | None] | None, Field(description="Q147 to Q149: shift of the ball in X, Y, Z.")]
     parameters: Annotated[
         dict[str, float | str],
@@ -122,11 +131,17 @@ class RunOut(BaseModel):
     balls: Annotated[list[dict[str, float | None]], Field(description="Every ball that was found from touches.")]
     not_understood: Annotated[list[str], Field(description="What of the protocol or the text was not understood.")]
     warnings: Warnings
-    limits: dict[str, float | None]
+    limits: Annotated[
+        dict[str, float | None],
+        Field(description="The machine's limits that it was judged by, mm and degrees; null: not limited."),
+    ]
     overtaken: Annotated[bool, Field(description="The kinematics is not the one it was measured on.")]
     undone: Annotated[bool, Field(description="It was entered, and the kinematics in effect is without it again.")]
-    confirmed: DecidedOut | None
-    entered: DecidedOut | None
+    confirmed: Annotated[
+        DecidedOut | None,
+        Field(description="Who confirmed a change larger than permitted; null: nobody, or there was no need."),
+    ]
+    entered: Annotated[DecidedOut | None, Field(description="Who entered its values on the control; null: nobody.")]
     given: Annotated[dict[str, Any], Field(description="As it was sent.")]
 
 
@@ -199,8 +214,8 @@ def parameters_of(row: RunRow) -> dict[str, float | str]:
 class RecomputedOut(BaseModel):
     """A run evaluated again from what was sent. What is on record stays as it is."""
 
-    run: int
+    run: Annotated[int, Field(description="Number of the run.")]
     same: Annotated[bool, Field(description="It comes to what is on record.")]
-    outcome: str
-    axes: list[AxisOut]
-    offsets: dict[str, float | None] | None
+    outcome: Annotated[str, Field(description="Status that it comes to now.")]
+    axes: Annotated[list[AxisOut], Field(description="The axes as they come out now.")]
+    offsets: Annotated[dict[str, float | None] | None, Field(description="Q147 to Q149 as they come out now, mm.")]

@@ -18,13 +18,13 @@ from app.web.fields import answer_from
 class BackupOut(BaseModel):
     """The kinematics as it was from one moment on. errors: what has been entered so far, by name."""
 
-    version: int
-    head: str | None
+    version: Annotated[int, Field(description="Counts up from 1.")]
+    head: Annotated[str | None, Field(description="The interchangeable head that it belongs to; null: none is named.")]
     at: Annotated[datetime, Field(description="When it was reported.")]
     since: Annotated[datetime, Field(description="Runs measured from then on were measured on it.")]
     by: str
     reason: str
-    errors: dict[str, float]
+    errors: Annotated[dict[str, float], Field(description="What has been entered so far, by name; mm and degrees.")]
     run: Annotated[int | None, Field(description="The run that led to it.")]
     restores: Annotated[int | None, Field(description="The version that was put back.")]
 
@@ -34,14 +34,16 @@ class DriftOut(BaseModel):
 
     name: str
     unit: str
-    limit: float | None
-    beyond: bool
-    last: float | None
-    true: float | None
-    runs: int
-    slope_per_day: float | None
-    slope_low: float | None
-    slope_high: float | None
+    limit: Annotated[float | None, Field(description="Largest that is permitted, in `unit`; null: not limited.")]
+    beyond: Annotated[bool, Field(description="The last value lies beyond the limit.")]
+    last: Annotated[float | None, Field(description="In the last run, in `unit`; null: there is none.")]
+    true: Annotated[float | None, Field(description="The same with what had been entered by then.")]
+    runs: Annotated[int, Field(description="Number of runs.")]
+    slope_per_day: Annotated[
+        float | None, Field(description="Of the line through the true values, `unit` a day; null: too few runs.")
+    ]
+    slope_low: Annotated[float | None, Field(description="Low end of its 95 % interval.")]
+    slope_high: Annotated[float | None, Field(description="High end of its 95 % interval.")]
     text: str
 
 
@@ -49,13 +51,15 @@ class ChangeOut(BaseModel):
     """A value in two runs. moved: the difference is more than scatter; none where no run says how sure it is."""
 
     name: str
-    words: str
+    words: Annotated[str, Field(description="The value in words.")]
     unit: str
-    before: float
-    after: float
-    difference: float
-    deviation: float | None
-    moved: bool | None
+    before: Annotated[float, Field(description="In the earlier run, in `unit`.")]
+    after: Annotated[float, Field(description="In the later run, in `unit`.")]
+    difference: Annotated[float, Field(description="Later less earlier, in `unit`.")]
+    deviation: Annotated[
+        float | None, Field(description="Standard deviation of the difference; null where no run says how sure it is.")
+    ]
+    moved: Annotated[bool | None, Field(description="It is more than scatter; null where no run says how sure it is.")]
     enter: Annotated[
         float | None,
         Field(
@@ -67,27 +71,35 @@ class ChangeOut(BaseModel):
 class HeadOut(BaseModel):
     """State of the axes with one of the heads, by its last run; changes: from the last run with the reference head."""
 
-    head: str | None
-    reference: bool
-    run: int
+    head: Annotated[str | None, Field(description="Name of the head; null: none is named.")]
+    reference: Annotated[bool, Field(description="It is the head that the others are compared with.")]
+    run: Annotated[int, Field(description="Number of its last run.")]
     measured_at: datetime
     version: Annotated[int, Field(description="Of the kinematics in effect; 0: nothing was entered yet.")]
-    in_effect: dict[str, float]
-    changes: list[ChangeOut]
+    in_effect: Annotated[dict[str, float], Field(description="What has been entered for it, by name; mm and degrees.")]
+    changes: Annotated[list[ChangeOut], Field(description="From the last run with the reference head to its own.")]
 
 
 class MachineKinematicsOut(BaseModel):
     """Limits of a machine's runs, the values in effect, and their drift."""
 
     machine: str
-    ball_radius: float | None
-    max_modification: float | None
-    max_modification_angle: float | None
-    max_dev_cal_ball: float | None
-    reference_head: str | None
-    limits: dict[str, float]
-    characteristics: dict[str, str]
-    in_effect: dict[str, float]
+    ball_radius: Annotated[float | None, Field(description="Q407 of the ball that is used here, mm.")]
+    max_modification: Annotated[
+        float | None, Field(description="A larger change, mm, has to be confirmed; null: not limited.")
+    ]
+    max_modification_angle: Annotated[float | None, Field(description="The same for how an axis leans, degrees.")]
+    max_dev_cal_ball: Annotated[
+        float | None, Field(description="A ball radius further off, mm, ends the run; null: not limited.")
+    ]
+    reference_head: Annotated[str | None, Field(description="The head that the others are compared with.")]
+    limits: Annotated[dict[str, float], Field(description="Of the drift, by the name of a value; mm, degrees.")]
+    characteristics: Annotated[
+        dict[str, str], Field(description="Values that become readings, with the key of the characteristic.")
+    ]
+    in_effect: Annotated[
+        dict[str, float], Field(description="What has been entered on the control, by name; mm and degrees.")
+    ]
     drift: Annotated[list[DriftOut], Field(description="Of the head asked for, or of the reference head.")]
     heads: Annotated[list[HeadOut], Field(description="Every head, and how it differs from the reference head.")]
 
@@ -133,9 +145,9 @@ class ComparisonOut(BaseModel):
     """Changes between two runs, and the values to enter on the control."""
 
     machine: str
-    before: int
-    after: int
-    changes: list[ChangeOut]
+    before: Annotated[int, Field(description="Number of the earlier run.")]
+    after: Annotated[int, Field(description="Number of the later run.")]
+    changes: Annotated[list[ChangeOut], Field(description="Every value that both runs hold.")]
 
 
 def changes_out(changes: list[Compared], errors: Mapping[str, float]) -> list[ChangeOut]:

@@ -30,7 +30,7 @@ Length = Annotated[float, Field(strict=True, ge=0, le=99_999.9999, allow_inf_nan
 class AxisPlanIn(Body):
     """Measuring plan of one axis."""
 
-    axis: AxisName
+    axis: Annotated[AxisName, Field(description="Letter of the axis.")]
     start: Annotated[Angle, Field(description="Q411, Q415, Q419: angle of the first position.")] = 0.0
     end: Annotated[Angle, Field(description="Q412, Q416, Q420: angle of the last position.")] = 0.0
     incidence: Annotated[
@@ -73,7 +73,7 @@ class MeasuringPlanIn(Body):
     mode: Annotated[int, Field(strict=True, ge=0, le=3, description="Q406, cycle 451 only.")] = 0
     preset: Annotated[int, Field(strict=True, ge=0, le=3, description="Q431, cycle 451 only.")] = 0
     memory: Annotated[int, Field(strict=True, ge=0, le=99_999, description="Q409: where cycle 450 saves before.")] = 0
-    axes: Annotated[list[AxisPlanIn], Field(max_length=3)]
+    axes: Annotated[list[AxisPlanIn], Field(description="The axes to measure, each once.", max_length=3)]
 
     @model_validator(mode="after")
     def _each_axis_once(self) -> Self:
@@ -104,7 +104,7 @@ class MeasuringPlanIn(Body):
 class AxisPositionsOut(BaseModel):
     """Measuring positions of an axis."""
 
-    axis: AxisName
+    axis: Annotated[AxisName, Field(description="Letter of the axis.")]
     positions: Annotated[list[float], Field(description="Angles, in the order of the control.")]
     arc: Annotated[float, Field(description="The smallest arc that holds them.")]
 
@@ -113,7 +113,7 @@ class MeasuringPlanOut(BaseModel):
     """A plan as the control runs it. Nothing was stored."""
 
     order: Annotated[list[AxisName], Field(description="The control measures A, then B, then C.")]
-    axes: list[AxisPositionsOut]
+    axes: Annotated[list[AxisPositionsOut], Field(description="The positions of each axis.")]
     values: Annotated[dict[str, float | str], Field(description="The Q parameters of the call.")]
     warnings: Warnings
     text: Annotated[str, Field(description="The program: cycle 450, the call, and the result strings taken apart.")]

@@ -47,8 +47,11 @@ class PositionIn(Body):
 class AxisIn(Body):
     """One rotary axis as it was measured."""
 
-    axis: AxisName
-    positions: Annotated[list[PositionIn], Field(min_length=1, max_length=MOST_POSITIONS)]
+    axis: Annotated[AxisName, Field(description="Letter of the axis.")]
+    positions: Annotated[
+        list[PositionIn],
+        Field(description="The ball at each angle of the axis.", min_length=1, max_length=MOST_POSITIONS),
+    ]
     ball: Annotated[
         Point | None,
         Field(
@@ -97,7 +100,10 @@ class ShiftIn(Body):
 
     nominal: Point
     centre: Annotated[Point | None, Field(description="Centre of the ball, X Y Z, mm.")] = None
-    touches: Annotated[list[Point] | None, Field(max_length=MOST_TOUCHES)] = None
+    touches: Annotated[
+        list[Point] | None,
+        Field(description="Where the ball was touched, at least four points.", max_length=MOST_TOUCHES),
+    ] = None
 
     @model_validator(mode="after")
     def _centre_or_touches(self) -> Self:
@@ -212,7 +218,9 @@ class KinematicsPlanIn(Body):
     max_dev_cal_ball: Annotated[
         Limit | None, Field(description="maxDevCalBall: a ball radius further off, mm, ends the run.")
     ] = None
-    reference_head: Annotated[Text200 | None, Field(max_length=64)] = None
+    reference_head: Annotated[
+        Text200 | None, Field(description="The head that the others are compared with.", max_length=64)
+    ] = None
     limits: Annotated[
         dict[str, Limit],
         Field(

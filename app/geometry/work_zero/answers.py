@@ -46,9 +46,9 @@ class ShiftOut(BaseModel):
 class TouchOut(BaseModel):
     """A touch as it came in."""
 
-    x: float | None = None
-    y: float | None = None
-    approach: ApproachName | None = None
+    x: Annotated[float | None, Field(description="Position of the tip's centre, mm; null: it was not said.")] = None
+    y: Annotated[float | None, Field(description="Position of the tip's centre, mm; null: it was not said.")] = None
+    approach: Annotated[ApproachName | None, Field(description="Direction in which the tip was moved.")] = None
 
 
 class ZeroOut(BaseModel):
@@ -56,24 +56,27 @@ class ZeroOut(BaseModel):
 
     id: int
     machine: str
-    kind: KindName
-    work_offset: str
-    fixture: str | None
+    kind: Annotated[KindName, Field(description="What was touched: a bore, boss, pocket, web or corner.")]
+    work_offset: Annotated[str, Field(description="The control's work offset that it is for, such as G54.")]
+    fixture: Annotated[str | None, Field(description="Key of the fixture; null: none was named.")]
     part: str | None
-    x: float | None
-    y: float | None
-    z: float | None
+    x: Annotated[float | None, Field(description="X of the zero, mm; null: it is left as it is.")]
+    y: Annotated[float | None, Field(description="Y of the zero, mm; null: it is left as it is.")]
+    z: Annotated[float | None, Field(description="Z of the zero, mm; null: it is left as it is.")]
     rotation: Annotated[float | None, Field(description="Degrees, counter-clockwise seen from +Z.")]
-    diameter: float | None
+    diameter: Annotated[float | None, Field(description="Of a bore or shaft, mm.")]
     length: Annotated[float | None, Field(description="Size along X.")]
     width: Annotated[float | None, Field(description="Size along Y.")]
     squareness: Annotated[float | None, Field(description="Degrees by which the angle of a corner differs from 90.")]
     uncertainty: Annotated[dict[str, float], Field(description="By result, 95 %; needs `repeatability`.")]
-    touches: list[TouchOut]
-    records: list[float] | None = None
+    touches: Annotated[list[TouchOut], Field(description="The touches, as they were sent.")]
+    records: Annotated[
+        list[float] | None,
+        Field(description="X1, X2, Y1, Y2 as the printed macros recorded them, in place of touches, mm."),
+    ] = None
     residuals: Annotated[list[float], Field(description="Per touch, positive into the material.")]
-    tip: float
-    notices: list[Notice]
+    tip: Annotated[float, Field(description="Diameter of the tip, mm; 0 where positions are of the surface.")]
+    notices: Annotated[list[Notice], Field(description="Reasons to check it before it is used.")]
     warnings: Warnings
     acknowledged: Acknowledged
     program: Annotated[
@@ -83,9 +86,11 @@ class ZeroOut(BaseModel):
             "acknowledged it begins with a block that stops the control."
         ),
     ]
-    shift: ShiftOut | None
-    readings: list[PushedOut]
-    touched_at: datetime
+    shift: Annotated[
+        ShiftOut | None, Field(description="Against what its fixture is compared with; null: nothing to compare with.")
+    ]
+    readings: Annotated[list[PushedOut], Field(description="Its results as readings of characteristics.")]
+    touched_at: Annotated[datetime, Field(description="When it was touched.")]
     received_at: datetime
     by: str
     key: str | None
@@ -96,12 +101,14 @@ class FixtureOut(BaseModel):
     """A fixture, what it is compared with, and how its last zero stands."""
 
     machine: str
-    fixture: str
-    basis: Basis
-    reference: int | None
-    warning: float | None
-    alarm: float | None
-    characteristics: dict[str, str]
+    fixture: Annotated[str, Field(description="Key of the fixture.")]
+    basis: Annotated[Basis, Field(description="What zeros are compared with: the first, the median, or a frozen one.")]
+    reference: Annotated[int | None, Field(description="The work zero that they are compared with; null for a median.")]
+    warning: Annotated[float | None, Field(description="A shift from which on there is a warning, mm; null: never.")]
+    alarm: Annotated[float | None, Field(description="A shift from which on there is an alarm, mm; null: never.")]
+    characteristics: Annotated[
+        dict[str, str], Field(description="Shifts that become readings, by axis, with the key of the characteristic.")
+    ]
     zeros: Annotated[int, Field(description="How many were found in it.")]
     last: Annotated[int, Field(description="The last work zero.")]
     shift: ShiftOut

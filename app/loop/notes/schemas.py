@@ -59,8 +59,8 @@ class WrittenNote(BaseModel):
     at: Annotated[datetime, Field(description="The moment that it is about.")]
     text: str
     key: str | None
-    written_at: datetime
-    written_by: str
+    written_at: Annotated[datetime, Field(description="When it was written.")]
+    written_by: Annotated[str, Field(description="Who wrote it.")]
     withdrawn: Annotated[WithdrawalOut | None, Field(description="null: it is in effect.")]
 
     @classmethod

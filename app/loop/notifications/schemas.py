@@ -114,7 +114,7 @@ class RouteIn(Rule):
     """A route."""
 
     name: Text200
-    enabled: bool = True
+    enabled: Annotated[bool, Field(description="false: it notifies nobody.")] = True
 
 
 class RouteOut(RouteIn):
@@ -122,7 +122,7 @@ class RouteOut(RouteIn):
 
     id: int
     created_at: datetime
-    created_by: str
+    created_by: Annotated[str, Field(description="Who made it.")]
 
     @classmethod
     def of(cls, row: NotificationRoute) -> Self:
@@ -141,7 +141,7 @@ class ReceiverIn(Body):
     """A receiver of notifications."""
 
     name: Text200
-    means: Means
+    means: Annotated[Means, Field(description="The way to it: mail, webhook or apprise.")]
     address: Annotated[
         str,
         Field(min_length=3, max_length=1000, description="A mail address, an address of the web, or one of apprise."),
@@ -187,7 +187,7 @@ class ReceiverOut(BaseModel):
 
     id: int
     name: str
-    means: Means
+    means: Annotated[Means, Field(description="The way to it: mail, webhook or apprise.")]
     address: Annotated[str, Field(description="Of apprise only the service: the rest is a secret.")]
     person: Annotated[int | None, Field(description="Number of the person whose own address it is.")]
     quiet: Annotated[list[HoursIn], Field(description="Quiet hours.")]
@@ -224,7 +224,7 @@ class DeliveryOut(BaseModel):
     id: int
     receiver: Annotated[int, Field(description="Number of the receiver.")]
     about: Annotated[Literal["alarms", "changes", "test"], Field(description="Its content.")]
-    subject: str
+    subject: Annotated[str, Field(description="Its heading.")]
     alarms: Annotated[list[int], Field(description="Numbers of the alarms in it.")]
     changes: Annotated[int, Field(description="How many changes are in it.")]
     state: Annotated[
@@ -232,7 +232,9 @@ class DeliveryOut(BaseModel):
         Field(description="`lost`: the server ended meanwhile; it is sent again."),
     ]
     asked_at: Annotated[datetime, Field(description="When it was due.")]
-    ended_at: datetime | None
+    ended_at: Annotated[
+        datetime | None, Field(description="When it was delivered, or given up; null: it is on its way.")
+    ]
     answer: Annotated[str | None, Field(description="What the receiver's server answered, or why it was not reached.")]
 
     @classmethod

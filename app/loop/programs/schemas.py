@@ -31,8 +31,8 @@ class ProgramIn(Body):
 class Remark(BaseModel):
     """An error, with the parameter that it concerns."""
 
-    field: str
-    message: str
+    field: Annotated[str, Field(description="The parameter that it concerns.")]
+    message: Annotated[str, Field(description="What is wrong with it, in words.")]
 
 
 class NoteOut(BaseModel):
@@ -46,18 +46,20 @@ class NoteOut(BaseModel):
 class ProgramLineOut(BaseModel):
     """A line and what was made of it."""
 
-    line: int
+    line: Annotated[int, Field(description="Number of the line, from 1.")]
     text: str
-    verdict: Verdict
-    notes: list[NoteOut]
+    verdict: Annotated[
+        Verdict, Field(description="`understood`, `ignored` as a program without a meaning here, or `not_understood`.")
+    ]
+    notes: Annotated[list[NoteOut], Field(description="What there is to say about it.")]
 
 
 class ProgramOut(BaseModel):
     """One of the programs in the text."""
 
-    kind: KindOf
-    first_line: int
-    last_line: int
+    kind: Annotated[KindOf, Field(description="Kind of program.")]
+    first_line: Annotated[int, Field(description="Number of its first line, from 1.")]
+    last_line: Annotated[int, Field(description="Number of its last line.")]
     parameters: Annotated[
         dict[str, Any],
         Field(
@@ -71,13 +73,13 @@ class ProgramOut(BaseModel):
     touches: Annotated[
         list[list[float]] | None, Field(description="The results as `touches` of a reading, where they are such.")
     ]
-    notes: list[NoteOut]
+    notes: Annotated[list[NoteOut], Field(description="What there is to say about it.")]
 
 
 class ProgramRead(BaseModel):
     """The content of a program text. Nothing was stored."""
 
-    control: ReadableControl
+    control: Annotated[ReadableControl, Field(description="The control that it was read for.")]
     program: Annotated[
         ProgramOut | None,
         Field(description="The one that makes a characteristic, if there is any; else what there is."),
@@ -85,8 +87,8 @@ class ProgramRead(BaseModel):
     problems: Annotated[list[Remark], Field(description="Why its parameters cannot be used as they are.")]
     warnings: Warnings
     not_understood: Annotated[int, Field(description="How many lines hold something that was not understood.")]
-    lines: list[ProgramLineOut]
-    programs: list[ProgramOut]
+    lines: Annotated[list[ProgramLineOut], Field(description="Every line, and what was made of it.")]
+    programs: Annotated[list[ProgramOut], Field(description="The programs in the text.")]
 
 
 def note_out(note: Note) -> NoteOut:

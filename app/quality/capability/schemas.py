@@ -23,7 +23,7 @@ from app.web.fields import answer_from
 class IndexOut(BaseModel):
     """An index with its two-sided confidence interval."""
 
-    value: float
+    value: float = Field(description="The index.")
     low: float | None = Field(description="Low end of the interval.")
     high: float | None = Field(description="High end of the interval.")
     method: str | None = Field(
@@ -58,8 +58,8 @@ class FalloutOut(BaseModel):
 class NormalityOut(BaseModel):
     """A test of normality; statistic and p_value are null where it could not be made."""
 
-    test: Literal["anderson_darling", "shapiro_wilk"]
-    statistic: float | None
+    test: Literal["anderson_darling", "shapiro_wilk"] = Field(description="Name of the test.")
+    statistic: float | None = Field(description="A² or W; null where it could not be made.")
     p_value: float | None
     readings: int = Field(description="Looked at; of more than 5000 so many, evenly taken.")
     text: str
@@ -76,14 +76,14 @@ class NormalityOut(BaseModel):
 class QuotedOut(BaseModel):
     """The index that may be quoted, with what it must not be read without."""
 
-    index: Literal["cpk", "ppk", "fitted", "percentile"]
-    value: float
+    index: Literal["cpk", "ppk", "fitted", "percentile"] = Field(description="Which index it is.")
+    value: float = Field(description="The index.")
     low: float | None = Field(
         description="Of the interval; null by percentiles of fewer than 2731 readings: none bounds them."
     )
-    high: float | None
+    high: float | None = Field(description="High end of the interval.")
     preliminary: bool = Field(description="Fewer than 100 readings, or than 1000 by percentiles.")
-    method: str
+    method: str = Field(description="How it was computed, in words.")
     window: str = Field(description="How many readings, which, and the method, in words.")
 
 
@@ -91,10 +91,10 @@ class PercentileOut(BaseModel):
     """Pp and Ppk by percentiles (ISO 22514-2), for readings that are not normally distributed."""
 
     low: float = Field(description="X0.135 %")
-    median: float
+    median: float = Field(description="X50 %, mm from the target.")
     high: float = Field(description="X99.865 %")
-    pp: float | None
-    ppk: float
+    pp: float | None = Field(description="The tolerance by X99.865 % - X0.135 %; null with one limit.")
+    ppk: float = Field(description="To the nearer limit, by the percentiles.")
     interval: IndexOut = Field(
         description="Of Ppk, by order statistics; its low end is null below 2731 readings, at 95 %: none bounds the percentile."
     )
@@ -157,22 +157,24 @@ class MachinePerformanceOut(BaseModel):
 class TestOut(BaseModel):
     """A test that the model was chosen by."""
 
-    question: str
-    test: str
-    numbers: str
-    answer: str
+    question: str = Field(description="What is asked.")
+    test: str = Field(description="Name of the test.")
+    numbers: str = Field(description="Its numbers, in words.")
+    answer: str = Field(description="What it says.")
 
 
 class InTimeOut(BaseModel):
     """The time-dependent distribution model of ISO 22514-2."""
 
-    model: Literal["A1", "A2", "B", "C1", "C2", "C3", "C4", "D"]
-    location: Literal["constant", "random", "systematic", "both"]
-    scatter_changes: bool
+    model: Literal["A1", "A2", "B", "C1", "C2", "C3", "C4", "D"] = Field(
+        description="The model of ISO 22514-2 that fits."
+    )
+    location: Literal["constant", "random", "systematic", "both"] = Field(description="How the mean changes.")
+    scatter_changes: bool = Field(description="The scatter inside subgroups changes.")
     share_between: float = Field(description="Share of the variance that lies between the subgroups.")
     slope: float = Field(description="Of the line through the subgroup means, mm per reading.")
-    subgroups: int
-    tests: list[TestOut]
+    subgroups: int = Field(description="Number of subgroups.")
+    tests: list[TestOut] = Field(description="The tests that the model was chosen by.")
     text: str
     means: str = Field(description="Which index it allows.")
 
@@ -180,9 +182,9 @@ class InTimeOut(BaseModel):
 class FiredOut(BaseModel):
     """Number of signals of a run rule, and the number that chance explains."""
 
-    rule: str
-    signals: int
-    expected: float
+    rule: str = Field(description="Name of the run rule.")
+    signals: int = Field(description="Number of its signals.")
+    expected: float = Field(description="Number that chance explains.")
     p_value: float
 
 
@@ -204,11 +206,11 @@ class WithoutOut(BaseModel):
 class InForceOut(BaseModel):
     """Parameters by which readings were judged."""
 
-    version: int
-    target: float
+    version: int = Field(description="Version of the parameters.")
+    target: float = Field(description="Size to aim at, mm.")
     half: float = Field(description="From the target to a limit: R35/2, or R35 from a natural limit.")
-    readings: int
-    natural_limit: Literal["none", "lower", "upper"]
+    readings: int = Field(description="Number of readings that were judged by it.")
+    natural_limit: Literal["none", "lower", "upper"] = Field(description="The limit that no part can pass.")
 
 
 class CapabilityOut(BaseModel):
@@ -217,8 +219,8 @@ class CapabilityOut(BaseModel):
     characteristic: str
     first_sequence: int | None
     last_sequence: int | None
-    first_at: datetime | None
-    last_at: datetime | None
+    first_at: datetime | None = Field(description="When the first reading was measured.")
+    last_at: datetime | None = Field(description="When the last reading was measured.")
     readings: int
     excluded: list[int] = Field(description="Sequences that somebody took out of the statistics; at most 1000.")
     probe_faults: list[int] = Field(description="Probe faults, which are no measurement of a part; at most 1000.")
@@ -228,29 +230,31 @@ class CapabilityOut(BaseModel):
     lower_limit: float | None = Field(
         description="Limits of the deviation, of the newest reading's version; null for a natural one."
     )
-    upper_limit: float | None
+    upper_limit: float | None = Field(description="The other limit of the deviation, mm; null for a natural one.")
     natural_limit: Literal["none", "lower", "upper"] = Field(
         description="The limit that no part can pass: it carries no index and no ppm."
     )
     one_sided: str | None = Field(description="Why `cp`, `pp` and `cpm` are null; null where both limits are judged.")
     versions: list[InForceOut] = Field(description="By which the readings were judged, the newest reading's last.")
-    confidence: float
+    confidence: float = Field(description="Of the intervals, such as 0.95.")
     mean: float | None
     sigma_within: float | None = Field(description="Of Cp and Cpk.")
     sigma_by: SigmaBy = Field(
         description="What sigma within is made of: `neighbours` by their mean moving range / d2, else pooled inside parts, shifts or nests."
     )
-    sigma_overall: float | None
+    sigma_overall: float | None = Field(description="Standard deviation of all readings, mm, of Pp and Ppk.")
     quote: Literal["cpk", "ppk", "fitted", "percentile", "none"] = Field(description="Which number may be quoted.")
     quoted: "QuotedOut | None" = Field(
         description="That number with its window and method; null where `quote` is none."
     )
     why_none: str | None = Field(description="Why none may be quoted; null where one may.")
-    cp: IndexOut | None
-    cpk: IndexOut | None
-    pp: IndexOut | None
-    ppk: IndexOut | None
-    cpm: IndexOut | None
+    cp: IndexOut | None = Field(description="The tolerance by 6 sigma within; null with one limit.")
+    cpk: IndexOut | None = Field(description="To the nearer limit, by 3 sigma within.")
+    pp: IndexOut | None = Field(description="The tolerance by 6 sigma overall; null with one limit.")
+    ppk: IndexOut | None = Field(description="To the nearer limit, by 3 sigma overall.")
+    cpm: IndexOut | None = Field(
+        description="Cp that counts the distance from the target as well; null with one limit."
+    )
     fitted: FittedOut | None = Field(
         description="Where the readings are not normal, or a natural limit has a distribution that fits better; of 100 readings and more."
     )
@@ -258,10 +262,10 @@ class CapabilityOut(BaseModel):
     ppm_within: FalloutOut | None = Field(description="Expected under a normal distribution with sigma within.")
     ppm_overall: FalloutOut | None = Field(description="The same with the sigma of all readings.")
     ppm_observed: FalloutOut | None = Field(description="Counted, each part by the tolerance in force.")
-    outside: int
+    outside: int = Field(description="Number of parts out of tolerance.")
     refused: str | None = Field(description="Why there is no index.")
-    normal: bool
-    normality: list[NormalityOut]
+    normal: bool = Field(description="Nothing speaks against a normal distribution.")
+    normality: list[NormalityOut] = Field(description="The tests for that.")
     stable: bool | None = Field(
         description="In control and constant in time: Cp and Cpk may be quoted. null: too few readings to say."
     )
@@ -271,14 +275,16 @@ class CapabilityOut(BaseModel):
     constant_in_time: bool | None = Field(
         description="By the model in time (ISO 22514): mean and scatter are constant, model A1 or A2."
     )
-    stability: str
+    stability: str = Field(description="In words, whether the process is in control and constant in time.")
     baseline: int | None = Field(description="Version of the frozen baseline it was judged by; null: by themselves.")
-    signals: list[FiredOut]
+    signals: list[FiredOut] = Field(description="Run rules that gave signals.")
     in_time: InTimeOut | None = Field(description="Of 50 readings and more.")
     tolerance_interval: ToleranceIntervalOut | None = Field(
         description="null of too few readings: of those that are not normal it takes so many that the extremes are enough."
     )
-    compensated: bool
+    compensated: bool = Field(
+        description="Corrections were in effect: the indices are those of process and correction together."
+    )
     without: WithoutOut | None = Field(description="Only where corrections were in effect.")
     cautions: list[str]
 

@@ -40,7 +40,7 @@ class RuleOut(BaseModel):
 
     rule: RuleName
     name: str
-    looks_for: str
+    looks_for: Annotated[str, Field(description="The pattern that it looks for.")]
     causes: str = Field(description="What usually lies behind it.")
     do: Do | None = Field(description="null: it is off.")
     since: int | None = Field(description="It judges from the reading after this one on; null: with the baseline.")
@@ -51,7 +51,7 @@ class ChartRulesOut(BaseModel):
 
     place: Place
     chart: Chart
-    rules: list[RuleOut]
+    rules: Annotated[list[RuleOut], Field(description="The rules that have a sense on this chart.")]
 
 
 class RulesOut(BaseModel):
@@ -60,7 +60,7 @@ class RulesOut(BaseModel):
     characteristic: str
     version: int = Field(description="0: the default, which nobody has set: nelson_1 is watched and raises no alarm.")
     baseline: int | None = Field(description="The version that they judge by; null: none is in force.")
-    charts: list[ChartRulesOut]
+    charts: Annotated[list[ChartRulesOut], Field(description="The rules, chart by chart.")]
     at: datetime | None
     actor: str | None
     reason: str | None
@@ -119,7 +119,7 @@ class TriedRuleOut(TriedOut):
     place: Place
     chart: Chart
     rule: RuleName
-    do: Do | None
+    do: Annotated[Do | None, Field(description="What it does today; null: it is off.")]
 
 
 class PreviewOut(BaseModel):
@@ -129,7 +129,7 @@ class PreviewOut(BaseModel):
     baseline: int | None = Field(description="null: none is in force, so nothing can be tried.")
     first_sequence: int | None
     last_sequence: int | None
-    rules: list[TriedRuleOut]
+    rules: Annotated[list[TriedRuleOut], Field(description="Every rule on its chart.")]
     together: TriedOut | None = Field(description="All rules that are switched on, at once.")
 
     @classmethod

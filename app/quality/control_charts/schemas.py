@@ -19,8 +19,8 @@ MOST_EXCLUDED = 100
 class ExcludedIn(Body):
     """A run of readings that is left out of the baseline, and why."""
 
-    first: Place
-    last: Place
+    first: Annotated[Place, Field(description="Sequence of the first reading that is left out.")]
+    last: Annotated[Place, Field(description="Sequence of the last one.")]
     reason: Reason
 
 
@@ -67,7 +67,7 @@ class PeriodIn(Body):
     group_pause: float | None = Field(
         None, strict=True, gt=0, le=100_000, description="Minutes without a reading that end a subgroup, for `pause`."
     )
-    ewma_lambda: float = Field(0.2, strict=True, ge=0.001, le=1)
+    ewma_lambda: float = Field(0.2, strict=True, ge=0.001, le=1, description="Weight of the newest reading.")
     ewma_width: float = Field(
         3.0, strict=True, gt=0, le=10, description="L: limits in standard deviations of the average."
     )
@@ -183,16 +183,16 @@ class DraftAnswer(DraftOut):
 class BaselineOut(DraftOut):
     """A frozen baseline. The newest version is in force unless it is retired."""
 
-    version: int
-    in_force: bool
+    version: Annotated[int, Field(description="Counts up from 1.")]
+    in_force: Annotated[bool, Field(description="Readings are judged by it.")]
     repeats: int | None = Field(description="The version whose numbers these are, where it was put in force again.")
-    parameters_version: int
+    parameters_version: Annotated[int, Field(description="Version of the parameters at its last reading.")]
     at: datetime
     actor: str
     reason: str
-    retired_at: datetime | None
-    retired_by: str | None
-    retired_why: str | None
+    retired_at: Annotated[datetime | None, Field(description="Since when it judges nothing; null: it was not retired.")]
+    retired_by: Annotated[str | None, Field(description="Who retired it.")]
+    retired_why: Annotated[str | None, Field(description="Why, in words.")]
 
 
 class PointsOut(Body):
@@ -201,21 +201,27 @@ class PointsOut(Body):
     first: list[int] = Field(description="First reading of each point.")
     last: list[int] = Field(description="Last reading of each point; of single values the same.")
     size: list[int] = Field(description="Readings in it.")
-    value: list[float]
+    value: Annotated[
+        list[float], Field(description="What is charted: a deviation, range or s in mm; of CUSUM the upper sum.")
+    ]
     below: list[float] | None = Field(description="CUSUM: the lower sum; value is the upper one.")
-    centre: list[float] | float | None
+    centre: Annotated[
+        list[float] | float | None, Field(description="Centre line; one number where all points have the same.")
+    ]
     lower: list[float] | float | None = Field(description="One number where all points have the same limit.")
-    upper: list[float] | float | None
+    upper: Annotated[
+        list[float] | float | None, Field(description="Upper limit; one number where all points have the same.")
+    ]
 
 
 class ChartSignalOut(Body):
     """A run of points that a rule speaks of."""
 
-    rule: str
+    rule: Annotated[str, Field(description="Name of the rule.")]
     side: int = Field(description="1 above or rising, -1 below or falling, 0 neither.")
     first: int = Field(description="The reading that it begins with.")
-    last: int
-    points: int
+    last: Annotated[int, Field(description="The reading that it ends with.")]
+    points: Annotated[int, Field(description="Number of its points.")]
     text: str
 
 
@@ -223,7 +229,7 @@ class ControlOut(Body):
     """A chart in numbers: at most 10 000 points, the newest; signals of all."""
 
     characteristic: str
-    chart: str
+    chart: Annotated[str, Field(description="Name of the chart.")]
     quantity: Quantity
     baseline: int | None = Field(
         description="Version that judged; null: there is none in force, so there are no limits."
@@ -235,5 +241,7 @@ class ControlOut(Body):
     settling: int = Field(description="Readings that set the level of an edge and are judged by nothing.")
     left_out: LeftOutOut
     points: PointsOut
-    signal_count: int
+    signal_count: Annotated[
+        int, Field(description="Number of all signals; more than are listed if there are very many.")
+    ]
     signals: list[ChartSignalOut] = Field(description="Newest first, at most 1000.")

@@ -31,16 +31,16 @@ class SignalOut(BaseModel):
     points: int = Field(description="How many points make it.")
     text: str
     baseline: int = Field(description="The version of the baseline that it was judged by.")
-    rules_version: int
+    rules_version: int = Field(description="The version of the rules that found it.")
     at: datetime = Field(description="When it was found.")
     last_at: datetime = Field(description="When its run was last seen to go on.")
     alarm: int | None = Field(description="The alarm that it raised.")
     excluded: int = Field(description="Readings of the run that were taken out of the statistics since.")
-    withdrawn_at: datetime | None
-    explained_at: datetime | None
-    explained_by: str | None
-    cause: Cause | None
-    comment: str | None
+    withdrawn_at: datetime | None = Field(description="When it was withdrawn; null: it stands.")
+    explained_at: datetime | None = Field(description="When somebody explained it; null: nobody has.")
+    explained_by: str | None = Field(description="Who explained it.")
+    cause: Cause | None = Field(description="Kind of cause.")
+    comment: str | None = Field(description="The explanation, in words.")
 
 
 class CommentIn(Body):

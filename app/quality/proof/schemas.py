@@ -19,7 +19,7 @@ class CheckOut(BaseModel):
     got: Numbers | None = Field(description="What this program computes now.")
     tolerance: float = Field(description="How far apart they may be.")
     difference: float | None = Field(description="How far apart they are; of a list the entry that is furthest off.")
-    passed: bool
+    passed: bool = Field(description="Both are the same within the tolerance.")
 
     @classmethod
     def of(cls, check: Check) -> "CheckOut":
@@ -38,17 +38,19 @@ class CheckOut(BaseModel):
 class ExampleOut(BaseModel):
     """One example."""
 
-    kind: str = Field(examples=["individuals"])
+    kind: str = Field(examples=["individuals"], description="What is computed.")
     name: str = Field(examples=["flow rate of ten batches"])
-    source: str = Field(examples=["NIST/SEMATECH e-Handbook of Statistical Methods, 6.3.2.2"])
+    source: str = Field(
+        examples=["NIST/SEMATECH e-Handbook of Statistical Methods, 6.3.2.2"], description="Where it was published."
+    )
     basis: Basis = Field(
         description="published in `source`; derived by hand, or computed independently, as `source` says.",
         examples=["published"],
     )
     note: str = Field(description="Why it cannot come out nearer, where that needs saying.")
-    passed: bool
+    passed: bool = Field(description="Every number comes out as published.")
     error: str | None = Field(description="What went wrong when it could not be computed at all.")
-    checks: list[CheckOut]
+    checks: list[CheckOut] = Field(description="Every number that was compared.")
 
     @classmethod
     def of(cls, result: Result) -> "ExampleOut":
@@ -68,11 +70,11 @@ class ExampleOut(BaseModel):
 class ProofOut(BaseModel):
     """All published examples, run through the engine of this process."""
 
-    passed: bool
+    passed: bool = Field(description="Every example comes out as published.")
     examples: int = Field(description="How many examples were run.")
     failing: int = Field(description="How many of them do not come out as published.")
     numbers: int = Field(description="How many numbers were compared.")
-    results: list[ExampleOut]
+    results: list[ExampleOut] = Field(description="The examples.")
 
     @classmethod
     def of(cls, proof: Proof) -> "ProofOut":

@@ -20,8 +20,8 @@ class PerPartOut(BaseModel):
 
     value: float = Field(description="mm per part; the sign says which way sizes go.")
     low: float = Field(description="95 % confidence interval.")
-    high: float
-    standard_error: float
+    high: float = Field(description="High end of that interval.")
+    standard_error: float = Field(description="Of the slope, mm per part.")
     is_wear: bool = Field(description="Whether the interval leaves 0 out: otherwise there is no wear to be seen.")
     first_sequence: int = Field(description="The readings that the line goes through.")
     last_sequence: int
@@ -52,7 +52,7 @@ class RecordOut(BaseModel):
     """Accuracy of the forecasts of earlier edges: made at several moments of each life, for the level it came to."""
 
     lives: int = Field(description="Tool lives that forecasts were tested on; 0: none is over.")
-    tested: int
+    tested: int = Field(description="Number of forecasts that were tested.")
     held: int = Field(
         description="How many held the true number of parts in their interval, each as wide as the lives before it had taught."
     )
@@ -89,10 +89,12 @@ class HuntingOut(BaseModel):
         description="Of so many reversals where 1 reading in 10 is tolerable; alarm below 0.001."
     )
     expected_corrections: float | None = Field(description="Per reading, by scatter alone with these settings.")
-    expected_reversals: float | None
-    expected_size: float | None
+    expected_reversals: float | None = Field(description="Per reading, by scatter alone with these settings.")
+    expected_size: float | None = Field(
+        description="Mean size error that a correction would remove, by scatter alone, mm."
+    )
     excess: float | None = Field(description="By what share the parts scatter more than with no correction at all.")
-    remedy: RemedyOut | None
+    remedy: RemedyOut | None = Field(description="The least change that helps; null: none is needed, or none does.")
     text: str = Field(description="The verdict in words.")
     what_to_do: str
 

@@ -107,8 +107,8 @@ class FiguresOut(BaseModel):
 
     readings: int = Field(description="Readings that count; excluded ones do not.")
     rejects: int = Field(description="Parts out of tolerance by their raw deviation; probe faults apart.")
-    oversize: int
-    undersize: int
+    oversize: Annotated[int, Field(description="Parts above the tolerance.")]
+    undersize: Annotated[int, Field(description="Parts below the tolerance.")]
     worn: int = Field(description="Readings in the wear zone.")
     faults: int = Field(description="Probe faults.")
     offset_limit: int = Field(description="Corrections not made because of max_total.")
@@ -140,7 +140,10 @@ class ReplayOut(FiguresOut):
 class LikenessOut(BaseModel):
     """The replay as it was set then, held against what truly happened."""
 
-    verdict: Literal["well", "roughly", "badly", "unknown"]
+    verdict: Annotated[
+        Literal["well", "roughly", "badly", "unknown"],
+        Field(description="How well the replay does what truly happened."),
+    ]
     off: float | None = Field(description="Root mean square of the difference between parts.")
     same: float | None = Field(description="Share of parts that are the same to 0.1 µm.")
     text: str
@@ -150,13 +153,13 @@ class LikenessOut(BaseModel):
 class EffectOut(BaseModel):
     """Measured share of a correction that acts: the slope with its 95 % interval; null where the readings do not show it."""
 
-    value: float | None
-    low: float | None
-    high: float | None
+    value: Annotated[float | None, Field(description="The share: 1 is in full.")]
+    low: Annotated[float | None, Field(description="Low end of its interval.")]
+    high: Annotated[float | None, Field(description="High end of its interval.")]
     corrections: int | None
     readings: int | None
     typical: float | None = Field(description="Median change of size that was commanded.")
-    scatter: float | None
+    scatter: Annotated[float | None, Field(description="Standard deviation of the changes about it, mm.")]
     is_full: bool | None = Field(description="Whether the interval holds 1.")
     text: str
 
@@ -167,8 +170,8 @@ class PeriodOut(BaseModel):
     characteristic: str
     first_sequence: int
     last_sequence: int
-    start: datetime
-    end: datetime
+    start: datetime = Field(description="When the first reading was measured.")
+    end: datetime = Field(description="When the last reading was measured.")
     readings: int
     left_out: int = Field(description="Readings of which nobody knows with which corrections they were cut.")
 
@@ -195,11 +198,11 @@ class WhatIfOut(PeriodOut):
 class CellOut(BaseModel):
     """One setting of the map."""
 
-    weighting_factor: float
-    zero_range: float
+    weighting_factor: Annotated[float, Field(description="k (R29) of this cell.")]
+    zero_range: Annotated[float, Field(description="R33 of this cell, mm.")]
     figures: FiguresOut | None = Field(description="null where R33 < R34 does not hold.")
     inside: bool = Field(description="As good as the best: within two standard errors of it, or 5 %.")
-    best: bool
+    best: Annotated[bool, Field(description="The best by the criterion.")]
     calmest: bool = Field(description="Of those as good as the best the one that corrects least.")
     reason: str | None = Field(description="Why there are no figures.")
 
@@ -208,10 +211,10 @@ class MapOut(PeriodOut):
     """A grid of settings, row by row of k."""
 
     criterion: Criterion
-    averaging_limit: float
-    delay: int
+    averaging_limit: Annotated[float, Field(description="R34 of every cell, mm.")]
+    delay: Annotated[int, Field(description="Parts between a correction and its effect in the replay.")]
     today: FiguresOut = Field(description="Today's settings, replayed.")
-    cells: list[CellOut]
+    cells: Annotated[list[CellOut], Field(description="Every cell, row by row of k.")]
 
     @classmethod
     def of(cls, settings_map: Map) -> "MapOut":
@@ -240,11 +243,11 @@ class ProposalOut(BaseModel):
     from_version: int = Field(description="The version it changes.")
     changes: dict[str, float] = Field(description="Parameters by name.")
     reason: str
-    proposed_by: str
-    proposed_at: datetime
-    decided_by: str | None
-    decided_at: datetime | None
-    decided_why: str | None
+    proposed_by: Annotated[str, Field(description="Who proposed it.")]
+    proposed_at: Annotated[datetime, Field(description="When it was proposed.")]
+    decided_by: Annotated[str | None, Field(description="Who decided; null: nobody has.")]
+    decided_at: Annotated[datetime | None, Field(description="When it was decided.")]
+    decided_why: Annotated[str | None, Field(description="Why, in words.")]
     made_version: int | None = Field(description="The version that approving it made.")
     evidence: dict[str, Any] = Field(description="What the what-if answered when it was proposed.")
 

@@ -25,7 +25,7 @@ class RankedOut(BaseModel):
     characteristic: str
     name: str
     machine: str
-    state: str
+    state: str = Field(description="How it stands, in a word.")
     reasons: list[AttentionReasonOut] = Field(description="The most urgent first; empty where nobody is needed.")
     ppk: float | None = Field(
         description="The index that may be quoted of the last 1000 readings, as on the page of capability; `quote` says which one: Cpk, Ppk, Ppk by a fitted distribution, or Ppk by percentiles. null where none may."

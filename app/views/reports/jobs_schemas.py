@@ -40,7 +40,10 @@ class ReportsIn(Body):
     sections: list[SectionName] = Field(
         default=[], max_length=len(SectionName), description="Only these sections; all of them where none is named."
     )
-    format: BundleFormat = "pdf"
+    format: Annotated[
+        BundleFormat,
+        Field(description="Of the files: a ZIP of them, or one `workbook` with a sheet for each characteristic."),
+    ] = "pdf"
     paper: Paper = Paper.A4
     timezone: str | None = Field(
         default=None, max_length=64, description="In which moments are written; the plant's if left out."
@@ -74,21 +77,24 @@ class TroubleOut(Body):
     """A characteristic without a report, and why."""
 
     characteristic: str
-    problem: str
+    problem: Annotated[str, Field(description="Why it has none, in words.")]
 
 
 class ReportsOut(Body):
     """Progress of a request for reports. `done` of `total` characteristics are ready; `current` is worked on."""
 
     id: int
-    state: Literal["queued", "running", "done", "failed", "cancelled"]
-    done: int
-    total: int
-    current: str | None
-    format: BundleFormat
-    asked_by: str
-    asked_at: datetime
-    finished_at: datetime | None
+    state: Annotated[
+        Literal["queued", "running", "done", "failed", "cancelled"],
+        Field(description="Whether it waits, is worked on, or has ended."),
+    ]
+    done: Annotated[int, Field(description="Number of characteristics that are ready.")]
+    total: Annotated[int, Field(description="Number of characteristics in all.")]
+    current: Annotated[str | None, Field(description="Key of the characteristic that is worked on.")]
+    format: Annotated[BundleFormat, Field(description="Of the files.")]
+    asked_by: Annotated[str, Field(description="Who asked for them.")]
+    asked_at: Annotated[datetime, Field(description="When.")]
+    finished_at: Annotated[datetime | None, Field(description="When they ended; null: they have not.")]
     problem: str | None = Field(description="Why they failed.")
     problems: int = Field(description="How many characteristics have no report, once done.")
     without_report: list[TroubleOut] = Field(description="Which these are, and why; only where one job is asked for.")

@@ -17,9 +17,9 @@ router = api_router("search", FROM_REPLICA)
 class SearchHit(BaseModel):
     """Something that bears the name that was searched."""
 
-    kind: queries.Kind
+    kind: Annotated[queries.Kind, Field(description="Kind of thing.")]
     key: Annotated[str, Field(description="What programs call it; of a part its name, of a page its path.")]
-    title: str
+    title: Annotated[str, Field(description="What people call it.")]
     path: Annotated[str, Field(description="Its page.")]
 
 
