@@ -4,6 +4,7 @@ from math import isfinite
 from typing import Any, Final, NamedTuple
 from zoneinfo import ZoneInfo
 
+from app.files.formats import spreadsheet
 from app.files.formats.cell_values import Unreadable, number
 from app.files.formats.file_times import LIVE, FileTimes
 from app.files.formats.units import LENGTHS, agreed, unit_behind
@@ -28,7 +29,8 @@ LONGEST_TEXT: Final = 128
 class Form(NamedTuple):
     """The form of values. scale: mm in a unit of the sizes. times: as strptime has it. zone: of times without an offset.
 
-    together: what the times of a file say together. unit: of the sizes, where the file says it.
+    together: what the times of a file say together. unit: of the sizes, where the file says it. sheet: they are
+    cells of a workbook.
     """
 
     scale: float
@@ -37,6 +39,7 @@ class Form(NamedTuple):
     zone: ZoneInfo | None = None
     together: FileTimes = LIVE
     unit: str | None = None
+    sheet: bool = False
 
     def in_unit(self, *words: Any) -> "Form":
         """The form of sizes whose column, row or cell says their unit. Raises `Unreadable`."""
@@ -46,11 +49,13 @@ class Form(NamedTuple):
     def value(self, field: str, value: Any) -> Any:
         """The value of a field but ``characteristic``; None of a time that is none. Raises `Unreadable`, whose words go behind the value."""
         text = str(value).strip()
+        if self.sheet:
+            spreadsheet.refuse_error(text)
         if field == "measured":
             if isinstance(value, bool) or not isinstance(value, int | float | str):
                 raise Unreadable("is not a number")
             text, behind = unit_behind(text)
-            size = value if isinstance(value, int | float) else number(text, self.decimal)
+            size = value if isinstance(value, int | float) else number(text, self._decimal_in(text))
             scale = self.in_unit(behind).scale
             if not isfinite(size * scale):
                 raise Unreadable("is not a number")
@@ -65,3 +70,6 @@ class Form(NamedTuple):
         if not 1 <= len(text) <= LONGEST_TEXT:
             raise Unreadable(f"is longer than {LONGEST_TEXT} characters" if text else "is empty")
         return text
+
+    def _decimal_in(self, text: str) -> str:
+        return spreadsheet.decimal_in(text) if self.sheet else self.decimal

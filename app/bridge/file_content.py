@@ -1,4 +1,4 @@
-"""The readings in a file of a measuring machine: CSV, NDJSON, a text protocol, or AQDEF. Nothing is moved or sent here.
+"""The readings in a file of a measuring machine: CSV, XLSX, NDJSON, a text protocol, or AQDEF. Nothing is moved or sent here.
 
 A file is taken whole or not at all: one line that cannot be read is a `Fault`, and a person puts the file right. Each reading has
 a key for ever. It is a hash of the file up to its line and of its own fields: the same file delivered again, or one that
@@ -10,6 +10,7 @@ import hashlib
 import io
 import json
 from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from math import isfinite
 from pathlib import Path
@@ -19,11 +20,13 @@ from msgspec import Struct
 
 from app.bridge.configuration import Machine, Positive
 from app.bridge.fields import EVERY, FIELDS, Form
-from app.bridge.file_rows import Fault, Found, csv_rows, ndjson_rows, reasons
+from app.bridge.file_rows import Fault, Found, Table, cell_of, csv_rows, has, ndjson_rows, reasons
 from app.bridge.links import Received
 from app.bridge.patterns import LONGEST_LINE, Patterns, TooSlow, check_expressions
 from app.core.ring import INCH
-from app.files.formats import aqdef, aqdef_values, delimited
+from app.errors import TooManyRequests
+from app.files.apart import apart, spend
+from app.files.formats import aqdef, aqdef_values, delimited, spreadsheet
 from app.files.formats.aqdef_context import context_of
 from app.files.formats.aqdef_keys import Keys
 from app.files.formats.aqdef_times import WallClock, day_order, time_of
@@ -32,7 +35,7 @@ from app.files.formats.file_times import times_of
 from app.files.formats.repeats import Repeats
 from app.files.formats.units import LENGTHS, UnknownUnit, length_unit, unit_beside, unit_in
 
-NAMES: Final = {"csv": "*.csv", "ndjson": "*.ndjson", "text": "*.txt", "aqdef": "*.df[qdxQDX]"}
+NAMES: Final = {"csv": "*.csv", "xlsx": "*.xls[xm]", "ndjson": "*.ndjson", "text": "*.txt", "aqdef": "*.df[qdxQDX]"}
 NOT_ALONE: Final = 2  # files of a pair
 
 
@@ -44,16 +47,16 @@ class Settings(Struct, forbid_unknown_fields=True, frozen=True):
     settle: s that a file whose last line has no end, or that cannot be read, has to stay the same. empty_after: s after
     which an empty file, or one without its pair, has failed. largest: MB.
 
-    columns: column (or name in NDJSON) by field of `FIELDS`; if empty, each is named as its field. Without ``measured`` the
+    columns: column (or name in NDJSON) by field of `FIELDS`, two as ``Date+Time``; if empty, each is named as its field. Without ``measured`` the
     names in ``characteristics`` are columns of sizes. lines: regular expressions with fields as named groups; one without
     ``measured`` holds for the lines below. decimal, delimiter, encoding: of the text; the last two are found out if they are
-    left out. times: the form of times, as strptime has it. zone: of times without an offset. day_first: in dates
+    left out. sheet: of a workbook; the first with cells if it is left out. times: the form of times, as strptime has it. zone: of times without an offset. day_first: in dates
     with strokes, AQDEF only. missing: marks in place of a size that was not measured. others: readings of a characteristic that has no name in ``characteristics`` make the file fail,
     or are passed over. decisions: an absolute path, of a file that says `stop` or `hold`; anyone who acts on it removes it.
     """
 
     path: str
-    format: Literal["csv", "ndjson", "text", "aqdef"]
+    format: Literal["csv", "xlsx", "ndjson", "text", "aqdef"]
     names: str | None = None
     done: str = "done"
     failed: str = "failed"
@@ -66,6 +69,7 @@ class Settings(Struct, forbid_unknown_fields=True, frozen=True):
     decimal: Literal[".", ","] = "."
     delimiter: str | None = None
     encoding: str | None = None
+    sheet: str | None = None
     times: str | None = None
     zone: str | None = None
     day_first: bool | None = None
@@ -148,12 +152,25 @@ def read_content(
     settings: Settings = machine.settings
     content = Content(stamp=stamp)
     try:
-        _Reader(machine, settings, paths, earlier, content).read()
+        with _as_text(settings, paths) as texts:
+            _Reader(machine, settings, texts, earlier, content).read()
+    except TooManyRequests as error:
+        raise OSError(str(error)) from error
     except delimited.Unusable as error:
         content.faults.append(Fault(error.line, "", str(error)))
     if not content.faults and not content.entries and not content.skipped:
         content.faults.append(Fault(None, "", _nothing_found(settings)))
     return content
+
+
+@contextmanager
+def _as_text(settings: Settings, paths: tuple[Path, ...]) -> Iterator[tuple[Path, ...]]:
+    """The files; in place of a workbook the text of its sheet, written in a process of its own: a small one may unpack to much."""
+    if settings.format != "xlsx":
+        yield paths
+        return
+    with spreadsheet.text_of(paths[0], settings.sheet, lambda *given: apart(spreadsheet.texts, *given, spend)) as text:
+        yield (text,)
 
 
 def files_of(path: Path) -> tuple[Path, ...]:
@@ -189,7 +206,7 @@ class _Reader:
         self.path = next((path for path in paths if path.suffix.lower() != ".dfd"), paths[0])
         self.scale = INCH if machine.unit == "inch" else 1.0
         self.zone = None if settings.zone is None else zone_named(settings.zone)
-        self.form = Form(self.scale, settings.decimal, settings.times, self.zone)
+        self.form = Form(self.scale, settings.decimal, settings.times, self.zone, sheet=settings.format == "xlsx")
         self.encoding = settings.encoding or (
             aqdef.encoding_of(self.path) if settings.format == "aqdef" else delimited.encoding_of(self.path)
         )
@@ -216,15 +233,10 @@ class _Reader:
     def read(self) -> None:
         match self.settings.format:
             case "csv":
-                self._table(
-                    csv_rows(
-                        self.path,
-                        self.encoding,
-                        self.settings.delimiter,
-                        self.settings.columns,
-                        complete=self.content.complete,
-                    )
-                )
+                delimiter = delimited.BLANKS if self.settings.delimiter == "blanks" else self.settings.delimiter
+                self._table(csv_rows(self.path, self._form_of_table(self.encoding, delimiter)))
+            case "xlsx":
+                self._table(csv_rows(self.path, self._form_of_table("utf-8", "\t")))
             case "ndjson":
                 self._table(ndjson_rows(self.lines))
             case "text":
@@ -235,11 +247,16 @@ class _Reader:
 
     # --- tables
 
+    def _form_of_table(self, encoding: str, delimiter: str | None) -> Table:
+        columns = set(filter(None, self.settings.columns.values()))
+        names = {*self.machine.characteristics, *(() if self.settings.columns else FIELDS)}
+        return Table(encoding, delimiter, columns, names, self.content.complete, self.settings.format == "xlsx")
+
     def _table(self, rows: Iterator[tuple[int, Found]]) -> None:
         columns = self.settings.columns or {name: name for name in FIELDS}
         table = list(rows)
         column = columns.get("measured_at", "")
-        written = (str(row.get(column) or "") for _line, row in table if isinstance(row, Mapping))
+        written = (str(cell_of(row, column) or "") for _line, row in table if isinstance(row, Mapping))
         self.form = self.form._replace(together=times_of(written, self.settings.times).live)
         units: dict[str, str | None] = {}
         for line, row in table:
@@ -249,7 +266,7 @@ class _Reader:
             if isinstance(row, aqdef.Remark):
                 self._remark(row)
                 continue
-            fields = {name: row[column] for name, column in columns.items() if column in row}
+            fields = {name: cell_of(row, column) for name, column in columns.items() if has(row, column)}
             if "unit" not in self.settings.columns:
                 fields["unit"] = unit_beside(row)
             sizes = (
@@ -413,7 +430,7 @@ class _Reader:
             return
         own = None
         for field_, value in fields.items():
-            if field_ in {"characteristic", "unit"} or value is None or (value == "" and field_ != "measured"):
+            if field_ in {"characteristic", "unit"} or ((value is None or value == "") and field_ != "measured"):
                 continue
             try:
                 if field_ == "key":

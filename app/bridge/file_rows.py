@@ -1,15 +1,16 @@
 """The rows of a table or of NDJSON by their columns, and what is wrong with one, in the order of the file."""
 
 import json
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
+from itertools import chain, islice
 from pathlib import Path
-from typing import Any, Final, NamedTuple
+from typing import Any, NamedTuple
 
 from app.bridge.json_text import read_json
 from app.files.formats import aqdef, delimited
+from app.files.formats.headings import TOP, Heading, as_wide, heading
 from app.files.formats.repeats import Repeats
-
-TITLES: Final = 50  # rows in which the names of the columns are looked for
+from app.files.formats.units import is_unit_column
 
 
 class Fault(NamedTuple):
@@ -45,34 +46,91 @@ Found = Mapping[str, Any] | Fault | aqdef.Remark
 """A row by its columns, or a remark on it."""
 
 
-def csv_rows(
-    path: Path, encoding: str, said: str | None, columns: Mapping[str, str], *, complete: bool
-) -> Iterator[tuple[int, Found]]:
-    """The rows of a table. said: its delimiter, or blanks. columns: those that are wanted. complete: its last line has an end."""
+class Table(NamedTuple):
+    """The form of a table. delimiter: None is found out. columns: those that are wanted. names: of other columns that count.
+
+    complete: its last line has an end. sheet: of a workbook, as text; what is beside the table is no part of it.
+    """
+
+    encoding: str
+    delimiter: str | None
+    columns: Collection[str]
+    names: Collection[str]
+    complete: bool = True
+    sheet: bool = False
+
+
+def csv_rows(path: Path, table: Table) -> Iterator[tuple[int, Found]]:
+    """The rows of a table."""
     try:
-        delimiter = delimited.BLANKS if said == "blanks" else said or delimited.delimiter_of(path, encoding)
-        rows = delimited.rows(path, encoding, delimiter)
-        header = _header(rows, set(filter(None, columns.values())))
-        if header is None:
+        delimiter = table.delimiter or delimited.delimiter_of(path, table.encoding)
+        rows = delimited.rows(path, table.encoding, delimiter)
+        top = list(islice(rows, TOP))
+        if not top:
             return
-        line = header.line
-        names = [name.strip().lstrip("\ufeff") for name in header.cells]
-        for name in sorted({name for name in names if name and names.count(name) > 1}):
+        line, names = _heading(top, table)
+        used = {part for column in table.columns for part in parts_of(column, names)}
+        counted = {name for name in names if name in used or name in table.names or is_unit_column(name)}
+        for name in sorted(name for name in counted if names.count(name) > 1):
             yield line, Fault(line, name, "is the name of several columns; give each its own.")
-        wanted = set(filter(None, columns.values())) - set(names)
+        wanted = used - set(names)
         for name in sorted(wanted):
-            yield line, Fault(line, name, f"is no column of this file; it has {', '.join(names)}.")
+            yield line, Fault(line, name, f"is no column of this file; it has {', '.join(filter(None, names))}.")
         if wanted:
             return
-        for row in delimited.even(rows, len(names), delimiter, complete=complete):
+        below = chain((row for row in top if row.line > line), rows)
+        for row in _as_wide(below, len(names), delimiter, table):
             if isinstance(row, delimited.Unusable):
                 yield row.line or 0, Fault(row.line, "", str(row))
-            elif [cell.strip() for cell in row.cells] == names:
+            elif tuple(cell.strip() for cell in row.cells) == names:
                 yield row.line, aqdef.Remark(row.line, "", "", "is the heading again; passed over")
             else:
                 yield row.line, dict(zip(names, row.cells, strict=False))
     except UnicodeError:
-        yield 0, Fault(None, "", f"This is not {encoding} text: name the encoding of the file.")
+        yield 0, Fault(None, "", f"This is not {table.encoding} text: name the encoding of the file.")
+
+
+def parts_of(column: str, names: Collection[str]) -> list[str]:
+    """The columns that a wanted one is made of: itself, or such as Date and Time of `Date+Time`.
+
+    >>> parts_of("Date+Time", ["Date", "Time"]), parts_of("C+", ["C+", "D"])
+    (['Date', 'Time'], ['C+'])
+    """
+    return [column] if column in names or "+" not in column else [part.strip() for part in column.split("+")]
+
+
+def cell_of(row: Mapping[str, Any], column: str) -> Any:
+    """The cell of a row in a column, or those that it is made of with a blank between them; None where it has none of them."""
+    parts = parts_of(column, row)
+    if len(parts) == 1:
+        return row.get(column)
+    cells = [str(row[part]).strip() for part in parts if row.get(part) is not None]
+    return " ".join(filter(None, cells)) if cells else None
+
+
+def has(row: Mapping[str, Any], column: str) -> bool:
+    """Tell if a row has a column, or one of those that it is made of."""
+    return column != "" and any(part in row for part in parts_of(column, row))
+
+
+def _heading(top: Sequence[delimited.Row], table: Table) -> Heading:
+    """The names of the columns: where an import finds them; else in the first row that has all that are wanted."""
+    found = heading(top, ragged=table.sheet) or Heading(top[0].line, ())
+    plain = [Heading(row.line, tuple(cell.strip().lstrip("\ufeff") for cell in row.cells)) for row in top]
+    fitting = (each for each in [found, *plain] if _has_all(each.names, table.columns))
+    return next(fitting, plain[0])
+
+
+def _has_all(names: Sequence[str], columns: Collection[str]) -> bool:
+    return all(part in names for column in columns for part in parts_of(column, names))
+
+
+def _as_wide(
+    rows: Iterable[delimited.Row], width: int, delimiter: str, table: Table
+) -> Iterator[delimited.Row | delimited.Unusable]:
+    if table.sheet:
+        return (as_wide(row, width) for row in rows)
+    return delimited.even(rows, width, delimiter, complete=table.complete)
 
 
 def ndjson_rows(lines: Iterable[str]) -> Iterator[tuple[int, Found]]:
@@ -92,16 +150,3 @@ def ndjson_rows(lines: Iterable[str]) -> Iterator[tuple[int, Found]]:
             yield number, content
         else:
             yield number, Fault(number, "", "is JSON but no object: each line is one {…}.")
-
-
-def _header(rows: Iterator[delimited.Row], wanted: set[str]) -> delimited.Row | None:
-    """The row that names the columns: the first one, below titles the one that has all that are wanted."""
-    first = next(rows, None)
-    if first is None or not wanted:
-        return first
-    row: delimited.Row | None = first
-    for _count in range(TITLES):
-        if row is None or wanted <= {cell.strip().lstrip("\ufeff") for cell in row.cells}:
-            return row or first
-        row = next(rows, None)
-    return first

@@ -15,6 +15,7 @@ from tempfile import TemporaryDirectory
 from typing import Any
 from zipfile import BadZipFile, ZipFile
 
+from app.files.formats.cell_values import Unreadable
 from app.files.formats.delimited import Unusable
 from app.files.formats.units import length_unit
 from app.language.i18n import _
@@ -68,13 +69,15 @@ def texts(path: Path, folder: Path, stem: str, spend: Spend = lambda _bytes: Non
 
 
 @contextmanager
-def text_of(path: Path, sheet: str | None) -> Iterator[Path]:
+def text_of(
+    path: Path, sheet: str | None, write: Callable[[Path, Path, str], dict[str, Path]] = texts
+) -> Iterator[Path]:
     """A sheet of the workbook as a file of text while it is needed: the named one, else the first that holds something.
 
-    Raises `Unusable`, also for a sheet that is not there.
+    write: `texts`, or a call of it in a process of its own. Raises `Unusable`, also for a sheet that is not there.
     """
     with TemporaryDirectory() as folder:
-        found = texts(path, Path(folder), "sheet")
+        found = write(path, Path(folder), "sheet")
         if sheet is not None and sheet not in found:
             there = ", ".join(found)
             raise Unusable(
@@ -174,9 +177,33 @@ class _Units:
         return self._of_styles[style]
 
 
+def refuse_error(text: str) -> None:
+    """Raises `Unreadable` for a cell of a workbook that has no result."""
+    if text == NO_RESULT:
+        raise Unreadable(
+            _("is a formula without a result in the file; open the workbook in a spreadsheet program and save it")
+        )
+    if text in ERRORS:
+        raise Unreadable(_("is an error of the workbook; correct or clear the cell"))
+
+
+def decimal_in(text: str) -> str:
+    """The decimal sign of a size in a workbook: its numbers have a point, and a text with a comma can be read in one way only.
+
+    >>> decimal_in("40,002"), decimal_in("40.002"), decimal_in("1.040,002")
+    (',', '.', '.')
+    """
+    return "," if "," in text and "." not in text else "."
+
+
 def _line(cells: Mapping[int, str]) -> str:
     width = max((place + 1 for place, text in cells.items() if text and place < MOST_COLUMNS), default=0)
-    return "\t".join(cells.get(place, "") for place in range(width))
+    return "\t".join(_quoted(cells.get(place, "")) for place in range(width))
+
+
+def _quoted(text: str) -> str:
+    """A cell as it is, but in quotation marks where it begins with one, such as the sign of inches."""
+    return '"' + text.replace('"', '""') + '"' if text.startswith('"') else text
 
 
 def _text(value: Any) -> str:

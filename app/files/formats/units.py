@@ -138,7 +138,8 @@ _UNIT_COLUMNS: Final = frozenset(map(folded, NAMES["unit"]))
 
 
 @lru_cache(maxsize=1024)
-def _is_unit_column(name: str) -> bool:
+def is_unit_column(name: str) -> bool:
+    """Tell of a column that names a unit for each row."""
     return folded(name) in _UNIT_COLUMNS
 
 
@@ -148,7 +149,7 @@ def unit_beside(row: Mapping[Any, Any]) -> Any:
     >>> unit_beside({"Actual": "0.4724", "Einheit": "Zoll"}), unit_beside({"Actual": "12"})
     ('Zoll', None)
     """
-    return next((value for name, value in row.items() if _is_unit_column(str(name))), None)
+    return next((value for name, value in row.items() if is_unit_column(str(name))), None)
 
 
 def in_mm(value: Any, unit: str | None) -> Any:

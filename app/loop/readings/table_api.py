@@ -1,5 +1,8 @@
 """JSON route: readings out of a table of somebody else, as the command and the page of imports take it."""
 
+from base64 import b64decode
+from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Annotated, Any, Literal
@@ -10,7 +13,9 @@ from pydantic import BaseModel, Field
 from app.access.deps import Engineer
 from app.db.engine import Database
 from app.errors import Invalid
-from app.files.formats.delimited import BLANKS
+from app.files.apart import apart, spend
+from app.files.formats import spreadsheet
+from app.files.formats.delimited import BLANKS, Unusable
 from app.files.formats.units import Unit
 from app.language.i18n import _
 from app.language.times import plant_zone
@@ -32,7 +37,7 @@ _Word = Annotated[str | None, Field(max_length=200)]
 
 
 class TableImport(Body):
-    """A table to import, decoded to text, and what the program is not to find out by itself."""
+    """A table to import, as text or as a workbook, and what the program is not to find out by itself."""
 
     name: Annotated[
         str,
@@ -40,10 +45,13 @@ class TableImport(Body):
             min_length=1,
             max_length=100,
             description="What the file is called; its ending says what it is: "
-            "csv, tsv, txt, ndjson, jsonl or json. For the record of changes.",
+            "csv, tsv, txt, ndjson, jsonl or json; xlsx or xlsm of a workbook. For the record of changes.",
         ),
     ]
-    content: Annotated[str, Field(min_length=1, description="The text of the file.")]
+    content: Annotated[str, Field(min_length=1, description="The text of the file; of a workbook its bytes in Base64.")]
+    sheet: Annotated[
+        str | None, Field(max_length=100, description="Of a workbook; if left out, the first that has cells.")
+    ] = None
     characteristic: Annotated[
         str | None, Field(max_length=64, description="The key of the characteristic, where all is of one.")
     ] = None
@@ -123,19 +131,14 @@ class TableImportResult(BaseModel):
 @router.post("/readings/table", responses=problems(404, 409, 413))
 @takes(64 * MEGABYTE, by="engineer")
 def import_table(request: Request, session: SessionDep, caller: Engineer, given: TableImport) -> TableImportResult:
-    """Import a table (CSV, text, NDJSON, JSON list): all of it or nothing, as history: it corrects nothing and raises no alarm.
+    """Import a table (CSV, text, NDJSON, JSON list, XLSX): all of it or nothing, as history: it corrects nothing and raises no alarm.
 
     Import it twice and nothing is stored twice. What is wrong is named by line and column. Readings as they are measured are
     sent to `/readings`.
     """
-    if Path(given.name).suffix.lower() not in ENDINGS:
-        reason = _("ends with none of {endings}; AQDEF is sent to /readings/aqdef, a workbook is saved as CSV")
-        raise Invalid.at("name", reason.format(endings=", ".join(ENDINGS)))
     database: Database = request.app.state.database
     session.commit()  # nothing is kept open while the table is read
-    with TemporaryDirectory() as folder:
-        path = Path(folder, "table")
-        path.write_text(given.content, "utf-8", newline="")
+    with _text_of(given) as path:
         layout = look_apart(path, _wishes(given), given.name).layout
         if given.characteristic or layout.names:
             refuse_incomplete(layout)
@@ -158,6 +161,41 @@ def import_table(request: Request, session: SessionDep, caller: Engineer, given:
             *left_out,
         ],
     )
+
+
+@contextmanager
+def _text_of(given: TableImport) -> Iterator[Path]:
+    """The table as a file of text. Raises `Invalid`."""
+    ending = Path(given.name).suffix.lower()
+    if ending not in {*ENDINGS, *spreadsheet.ENDINGS}:
+        reason = _(
+            "ends with none of {endings}; AQDEF is sent to /readings/aqdef, a workbook of old (xls) is saved as xlsx"
+        )
+        raise Invalid.at("name", reason.format(endings=", ".join((*ENDINGS, *sorted(spreadsheet.ENDINGS)))))
+    with TemporaryDirectory() as folder:
+        path = Path(folder, "table")
+        if ending in ENDINGS:
+            path.write_text(given.content, "utf-8", newline="")
+            yield path
+            return
+        try:
+            path.write_bytes(b64decode(given.content, validate=True))
+        except ValueError:
+            raise Invalid.at("content", _("is no Base64: the bytes of a workbook are sent so")) from None
+        with _sheet(path, given.sheet) as text:
+            yield text
+
+
+@contextmanager
+def _sheet(path: Path, name: str | None) -> Iterator[Path]:
+    with ExitStack() as stack:
+        try:
+            text = stack.enter_context(
+                spreadsheet.text_of(path, name, lambda *to: apart(spreadsheet.texts, *to, spend))
+            )
+        except Unusable as error:
+            raise Invalid.at("content", str(error)) from None
+        yield text
 
 
 def _wishes(given: TableImport) -> Wishes:

@@ -196,7 +196,7 @@ def _of_row(row: Row, layout: Layout, readers: Sequence["_Reader"]) -> Iterator[
             size, behind = unit_behind(text)
         try:
             if layout.kind == "sheet":
-                _refuse_error(text)
+                spreadsheet.refuse_error(text)
             value = read(size)
             if value is not None or not (text and name == "measured_at"):  # a default of programs is no time
                 values[name] = value
@@ -240,23 +240,11 @@ def _is_missing(size: str, layout: Layout) -> bool:
 _Reader = tuple[str, tuple[int, ...], Callable[[str], Any]]
 
 
-def _refuse_error(text: str) -> None:
-    """Raises `Unreadable` for a cell of a workbook that has no result."""
-    if text == spreadsheet.NO_RESULT:
-        raise Unreadable(
-            _("is a formula without a result in the file; open the workbook in a spreadsheet program and save it")
-        )
-    if text in spreadsheet.ERRORS:
-        raise Unreadable(_("is an error of the workbook; correct or clear the cell"))
-
-
 def _readers(layout: Layout) -> list[_Reader]:
     decimal, zone, pattern = layout.decimal, layout.zone, layout.time_format
 
     def length(text: str) -> float:
-        # Numbers of a workbook have no decimal sign: a text with a comma among them can be read in one way only.
-        comma = layout.kind == "sheet" and "," in text and "." not in text
-        return cell_values.number(text, "," if comma else decimal)
+        return cell_values.number(text, spreadsheet.decimal_in(text) if layout.kind == "sheet" else decimal)
 
     def time(text: str) -> datetime | None:
         return layout.times.moment(text, zone, pattern)

@@ -4,7 +4,7 @@ import json
 import sys
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from itertools import accumulate, chain, islice
+from itertools import chain, islice
 from pathlib import Path
 from typing import Any, NamedTuple
 from zoneinfo import ZoneInfo
@@ -15,6 +15,7 @@ from app.files.formats.cell_values import slashed
 from app.files.formats.column_names import NAMES
 from app.files.formats.delimited import Row, Unusable
 from app.files.formats.file_times import FileTimes, times_of
+from app.files.formats.headings import TOP, as_wide, heading
 from app.files.formats.units import LENGTHS, UnknownUnit, unit_behind, unit_in
 from app.language.i18n import _
 from app.loop.readings.origin import COLUMNS
@@ -22,7 +23,6 @@ from app.loop.readings.origin import COLUMNS
 MOST_COLUMNS = 500
 LONGEST_NAME = 1_000
 """Characters of a column's name, or a characteristic's: the page shows each a dozen times, and a cell may have 131,072."""
-TOP = 50  # rows in which the header is looked for
 ORIGIN = COLUMNS[:2]
 """Fields that are no choice of a person: they are there in what Inband wrote."""
 NO_DIGIT = "*"
@@ -235,7 +235,11 @@ def _csv_layout(path: Path, wishes: Wishes, zone: ZoneInfo | None, kind: str = "
     top = list(islice(rows, TOP))
     if not top:
         raise wrong("file", _("The file is empty."))
-    head, header = _head(top, wishes.header_line, ragged=kind == "sheet")
+    found = heading(top, wishes.header_line, ragged=kind == "sheet")
+    if found is None:
+        words = _("Line {n} is empty, or too far below to be the header of the columns.")
+        raise wrong("header_line", words.format(n=wishes.header_line))
+    head, header = found
     _refuse_wide(header)
     first_line = max(head + 1, wishes.first_line or 0)
     columns = _columns(header, wishes.mapping)
@@ -330,59 +334,9 @@ def rows_of(path: Path, layout: Layout) -> Iterator[Row | Unusable]:
     every = delimited.rows(path, layout.encoding, layout.delimiter)
     rows = (row for row in every if layout.first_line <= row.line <= last)
     if layout.kind == "sheet":  # what is beside the table is no part of it
-        return (_as_wide(row, width) for row in rows)
+        return (as_wide(row, width) for row in rows)
     complete = layout.last_line is not None or delimited.is_complete(path)
     return delimited.even(rows, width, layout.delimiter, complete=complete)
-
-
-def _as_wide(row: Row, width: int) -> Row:
-    return row._replace(cells=row.cells[:width] + [""] * (width - len(row.cells)))
-
-
-def _head(top: Sequence[Row], said: int | None, *, ragged: bool) -> tuple[int, tuple[str, ...]]:
-    """The line of the header, and the names of the columns.
-
-    A name that is missing in this line is taken from the lines above, as cells that are merged downwards have it. Where names
-    are there twice, the group above them is said too, as cells that are merged across have it. ragged: rows may be shorter
-    than the table is wide.
-    """
-    last = _last_head(top) if said is None else next((at for at, row in enumerate(top) if row.line == said), None)
-    if last is None:
-        raise wrong(
-            "header_line", _("Line {n} is empty, or too far below to be the header of the columns.").format(n=said)
-        )
-    width = max(len(row.cells) for row in top) if ragged else len(top[last].cells)
-    names, *above = ([cell.strip() for cell in _as_wide(row, width).cells] for row in reversed(top[: last + 1]))
-    groups = [cells for cells in above if len(list(filter(None, cells))) > 1]  # a single cell is a title
-    for cells in groups:
-        names = [name or upper for name, upper in zip(names, cells, strict=True)]
-    if groups:
-        across = accumulate(groups[0], _or_before)
-        names = [
-            f"{group} {name}".strip() if name and names.count(name) > 1 else name
-            for group, name in zip(across, names, strict=True)
-        ]
-    return top[last].line, tuple(name.removeprefix("\ufeff") for name in names)
-
-
-def _or_before(before: str, cell: str) -> str:
-    return cell or before
-
-
-def _last_head(top: Sequence[Row]) -> int:
-    """The place of the header among the first rows: the first one, unless columns below it are named only further down."""
-    body = next((at for at, row in enumerate(top) if any(map(delimited.is_value, row.cells))), 0)
-    wanted, named = _filled(top[body]), set[int]()
-    best, most = 0, 0
-    for at, row in enumerate(top[:body]):
-        named |= _filled(row)
-        if len(wanted & named) > most:
-            best, most = at, len(wanted & named)
-    return best
-
-
-def _filled(row: Row) -> set[int]:
-    return {place for place, cell in enumerate(row.cells) if cell.strip()}
 
 
 def _json_layout(path: Path, wishes: Wishes, zone: ZoneInfo | None, *, is_list: bool) -> Layout:

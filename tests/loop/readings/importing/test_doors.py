@@ -5,26 +5,30 @@ lines. All doors are called in this process, on one plant.
 """
 
 import html
+import io
 import json
 import re
+from base64 import b64encode
 from collections.abc import Iterator
 from dataclasses import dataclass, field
-from datetime import UTC, datetime
+from datetime import UTC, datetime, time
 from pathlib import Path
 from typing import Any
 
 import click
 import pytest
 import typer
+from openpyxl import Workbook
 
+from app.bridge import file_content
 from app.bridge.configuration import configuration_from
 from app.bridge.file_content import read_content
 from app.cli import data
 from app.errors import InbandError
 from app.files.formats.aqdef_values import OF_CHARACTERISTIC as C
 from app.files.formats.aqdef_values import OF_FIELD as F
-from app.loop.readings import exporting, queries
-from app.loop.readings.importing import drawn
+from app.loop.readings import exporting, queries, table_api
+from app.loop.readings.importing import drawn, uploads
 from app.loop.readings.importing import lines as importing
 from app.loop.readings.importing.aqdef import actions as aqdef_actions
 from app.loop.readings.importing.aqdef import content as aqdef_content
@@ -44,8 +48,9 @@ Readings = list[tuple[float, str | None]]
 class Case:
     """A file and its right outcome. good: sizes, mm, and moments, UTC; bad: lines that are refused. how: options of each door."""
 
-    text: str
+    text: str = ""
     good: Readings = field(default_factory=list)
+    cells: list[list[Any]] = field(default_factory=list)  # of a workbook, in place of a text
     bad: tuple[int, ...] = ()
     size: str = "40"
     column: str = ""  # of the measured value, where its name does not say so
@@ -55,6 +60,19 @@ class Case:
     encoding: str = "utf-8"
     words: str = ""  # in the refusal
     whole: bool = False  # refused as a whole, without a line
+
+    @property
+    def content(self) -> bytes:
+        """The file."""
+        if not self.cells:
+            return self.text.encode(self.encoding)
+        book, held = Workbook(), io.BytesIO()
+        sheet = book.active
+        assert sheet is not None
+        for row in self.cells:
+            sheet.append(row)
+        book.save(held)
+        return held.getvalue()
 
 
 def morning(*sizes: float) -> Readings:
@@ -186,6 +204,24 @@ TABLES = {
         [(40.001, "2025-11-18T06:05:00.123456"), (40.002, "2025-11-18T05:06:00")],
     ),
 }
+DAY = datetime(2025, 11, 18)  # noqa: DTZ001 - a cell knows no zone
+BOOKS = {
+    "workbook": Case(
+        cells=[
+            ["Date", "Time", "Size", ""],
+            ["", "", "D40", "Unit"],
+            [DAY, time(6, 5), 40.001, "mm"],
+            ["18.11.2025", "06:06", "40,002", "mm"],
+            [DAY, time(6, 7), 1.57488, '"'],
+        ],
+        good=morning(40.001, 40.002, 40.001952),
+    ),
+    "workbook with a formula": Case(
+        cells=[["Time", "D40"], [DAY, 40.001], [DAY, "=A1"], [DAY, "#N/A"]], bad=(3, 4), words="formula"
+    ),
+    "workbook that is none": Case("Time;D40\n18.11.2025;40,001\n", whole=True, words="not an XLSX workbook"),
+}
+TABLES |= BOOKS
 """By their names; `Time` or what stands for it is the column of times."""
 TIMES = ("Date+Time", "Datum+Uhrzeit", "Time", "Zeit")
 
@@ -209,7 +245,7 @@ class Plant:
         """What the command says; the error that it ends with."""
         try:
             data.import_file(path, timezone=ZONE, database_url=self.house.database.dsn, **options)
-        except (typer.Exit, click.ClickException, InbandError) as error:
+        except (typer.Exit, typer.BadParameter, click.ClickException, InbandError) as error:
             return f"refused {error}"
         return ""
 
@@ -229,6 +265,8 @@ class Plant:
             data={"csrf": csrf, "characteristic": characteristic},
             files={"file": (path.name, path.read_bytes())},
         )
+        if sent.status_code == 422:
+            return f"refused {sent.text}"
         assert sent.status_code == 200, sent.text
         token = re.search(r"/import/([\w-]{22})", str(sent.url))
         assert token is not None
@@ -247,7 +285,14 @@ class Plant:
 def plant(new_database: NewDatabase) -> Iterator[Plant]:
     url = new_database()
     with pytest.MonkeyPatch.context() as patch, in_process(url, timezone=ZONE) as house:
-        for module in (importing, aqdef_actions, aqdef_content):  # tests/files/test_apart.py has the other process
+        for module in (
+            importing,
+            aqdef_actions,
+            aqdef_content,
+            table_api,
+            uploads,
+            file_content,
+        ):  # tests/files/test_apart.py has the other process
             patch.setattr(module, "apart", lambda work, *given: work(*given))
         yield Plant(house)
     drop_database(url)
@@ -274,6 +319,8 @@ def as_expected(found: Readings, case: Case) -> bool:
 
 def names_of(case: Case) -> tuple[list[str], str]:
     """The names of the columns, and the one that is measured."""
+    if case.cells:
+        return ["Date", "Time"] if "Date" in case.cells[0] else ["Time"], "D40"
     rows = [line for line in case.text.replace("\ufeff", "").splitlines() if line and "sep=" not in line]
     head = next(line for line in rows if not line.startswith(("Plate", "Date:")))
     cells = [cell.strip().strip('"') for cell in re.split(r"[;,\t]| {2,}", head.strip())]
@@ -283,8 +330,8 @@ def names_of(case: Case) -> tuple[list[str], str]:
 @pytest.mark.parametrize("name", TABLES)
 def test_a_table_means_the_same_at_every_door(plant: Plant, tmp_path: Path, name: str) -> None:
     case = TABLES[name]
-    path = tmp_path / f"{name.replace(' ', '-')}.csv"
-    path.write_bytes(case.text.encode(case.encoding))
+    path = tmp_path / f"{name.replace(' ', '-')}.{'xlsx' if name in BOOKS else 'csv'}"
+    path.write_bytes(case.content)
     cells, column = names_of(case)
     refused = bool(case.bad) or case.whole
 
@@ -295,7 +342,8 @@ def test_a_table_means_the_same_at_every_door(plant: Plant, tmp_path: Path, name
 
     by_rest = plant.shop.another("rest", **LENGTHS[case.size])
     how = case.cli | ({"missing": case.cli["missing"].split(",")} if "missing" in case.cli else {})
-    answer = plant.table(path, case.text, characteristic=by_rest, map={"measured": column}, timezone=ZONE, **how)
+    content = b64encode(case.content).decode() if name in BOOKS else case.text
+    answer = plant.table(path, content, characteristic=by_rest, map={"measured": column}, timezone=ZONE, **how)
     assert as_expected(plant.stored(by_rest), case), answer
     assert (answer["status"] == 422) == refused
     found = {int(line) for line in re.findall(r"line (\d+)", str([each["field"] for each in answer.get("errors", [])]))}
@@ -310,12 +358,11 @@ def test_a_table_means_the_same_at_every_door(plant: Plant, tmp_path: Path, name
     assert sorted(set(lines)) == list(case.bad)
     assert case.words in shown
 
-    time = next((each for each in TIMES if all(part in cells for part in each.split("+"))), None)
-    if time is not None and "+" in time:
-        return  # the bridge's columns are single ones
-    columns = {"measured": column} | ({"measured_at": time} if time else {})
+    at = next((each for each in TIMES if all(part in cells for part in each.split("+"))), None)
+    columns = {"measured": column} | ({"measured_at": at} if at else {})
     decimal = "." if re.search(r"[;,\t ]-?\d+\.\d{3,}\b", case.text) else ","
-    readings, faults, words = bridged(path, {"*": "x"}, columns=columns, decimal=decimal, **case.bridge)
+    form = {"format": "xlsx"} if name in BOOKS else {"decimal": decimal}
+    readings, faults, words = bridged(path, {"*": "x"}, columns=columns, **form, **case.bridge)
     assert refused or as_expected(readings, case)
     assert case.whole or sorted(set(faults)) == list(case.bad), words  # type: ignore[type-var]
     assert bool(faults) == refused
@@ -444,7 +491,7 @@ def test_a_table_by_rest_says_how_it_was_understood(plant: Plant, tmp_path: Path
     assert (answer["stored"], answer["unit"], answer["ignored"]) == (1, "um", ["Remark"])
     assert answer["columns"] == {"measured": "Wert [µm]", "measured_at": "Time"}
     assert plant.stored(key) == []
-    for name, words in (("a.dfq", "/readings/aqdef"), ("a.xlsx", "a workbook is saved as CSV")):
+    for name, words in (("a.dfq", "/readings/aqdef"), ("a.xls", "saved as xlsx"), ("a.xlsx", "Base64")):
         assert words in str(plant.table(tmp_path / name, text, characteristic=key))
     plant.shop.call("POST", "/readings/table", 404, name="a.csv", content=text, characteristic="nobody")
     wide = plant.table(tmp_path / "a.csv", f"{key}\n40.001\n", characteristics={"1": key})

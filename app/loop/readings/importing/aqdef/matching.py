@@ -5,7 +5,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
-from app.core.natural import NaturalLimit, looks_natural
+from app.core.natural import NaturalLimit, looks_natural, target_of
 from app.core.parameters import Parameters, default_averaging_limit
 from app.core.plausibility import INCH, inch_warnings, looks_like_inches
 from app.files.formats.aqdef import LONGEST, Characteristic, Description
@@ -62,10 +62,20 @@ class Content:
 
     @property
     def target(self) -> float | None:
-        """The size expected, mm: nominal, else between the limits."""
+        """The size expected, mm: nominal, else the natural limit, else between the limits."""
         if self.nominal is not None:
             return self.nominal
-        return None if self.lower is None or self.upper is None else (self.lower + self.upper) / 2
+        if self.lower is None or self.upper is None:
+            return None
+        return target_of(0.0, self.upper, self.lower, self.natural)
+
+    @property
+    def natural(self) -> NaturalLimit | None:
+        """The natural limit that it is set up with: the file's, else 0 of a form, which nothing is below."""
+        if self.natural_limit is None and self.lower == 0 and not self.nominal:
+            of_form = self.nominal == 0 or looks_natural(f"{self.number} {self.name}")
+            return NaturalLimit.LOWER if of_form else None
+        return self.natural_limit
 
 
 @dataclass
@@ -201,9 +211,7 @@ def parameters_of(content: Content) -> dict[str, Any]:
     lower, upper = content.lower or 0.0, content.upper or 0.0
     nominal = content.target or 0.0
     width = round(upper - lower, 9)
-    natural = content.natural_limit
-    if natural is None and lower == 0 and nominal == 0:
-        natural = NaturalLimit.LOWER
+    natural = content.natural
     wear = max(0.3, width)
     return {
         "nominal": round(nominal, 9),

@@ -10,6 +10,7 @@ import pytest
 from playwright.sync_api import Page, expect
 from sqlalchemy import text
 
+from app.core.parameters import read
 from app.db.engine import Database
 from app.errors import Invalid
 from app.files.formats.aqdef import Source
@@ -97,6 +98,29 @@ def test_what_is_known_is_found_and_what_is_missing_is_set_up(plant: Database, t
     assert (parameters["target"], parameters["tolerance_width"], parameters["mode"]) == (0, 0.005, "measure_only")
     assert parameters["natural_limit"] == "lower"  # K2120 = 2
     assert scalar(plant, "SELECT (SELECT count(*) FROM correction) + (SELECT count(*) FROM alarm)") == 0
+
+
+@pytest.mark.parametrize(
+    ("lines", "target", "natural"),
+    [
+        (["K2002/1 Roundness", "K2110/1 0", "K2111/1 0.005", "K2120/1 2"], 0.0, "lower"),
+        (["K2002/1 Roundness", "K2111/1 0.005"], 0.0, "lower"),
+        (["K2002/1 Roundness", "K2110/1 0", "K2111/1 0.005"], 0.0, "lower"),  # its name says it
+        (["K2002/1 Rundlauf", "K2110/1 0", "K2111/1 0.005", "K2120/1 1"], 0.0, "lower"),  # so it does here
+        (["K2002/1 Gap", "K2110/1 0", "K2111/1 0.005"], 0.0025, "none"),
+        (["K2002/1 Gap", "K2110/1 0", "K2111/1 0.005", "K2120/1 1"], 0.0025, "none"),
+        (["K2002/1 Contact", "K2110/1 0.9", "K2111/1 1", "K2121/1 2"], 1.0, "upper"),
+        (["K2002/1 Seat", "K2110/1 39.98", "K2111/1 40.02"], 40.0, "none"),
+    ],
+)
+def test_the_target_of_a_form_is_its_natural_limit_where_no_nominal_size_says_it(
+    tmp_path: Path, lines: list[str], target: float, natural: str
+) -> None:
+    path = written(tmp_path / "a.dfq", ["K0100 1", "K2001/1 X", "K2142/1 mm", *lines, row(0, "0.002")])
+    [content] = matching.contents(actions.describe(Source.at(path)))
+    parameters, _problems = read(matching.parameters_of(content))
+    assert (content.target, content.not_new) == (target, "")
+    assert (parameters.target, parameters.natural_limit) == (target, natural)
 
 
 def test_the_same_file_again_and_a_longer_one_store_nothing_twice(plant: Database, tmp_path: Path) -> None:
