@@ -26,6 +26,7 @@ PAGES = {
     ],
     "/station/{machine}/corrections/{number}": ["/station/{machine}/corrections/{waiting}?do=approve"],
     "/station/{machine}/note": ["/station/{machine}/note"],
+    "/station/{machine}/sizes": ["/station/{machine}/sizes"],
     "/notes": ["/notes", "/notes?machine={machine}", "/notes?characteristic={characteristic}"],
     "/notes/new": ["/notes/new?machine={machine}", "/notes/new?characteristic={characteristic}&sequence=3"],
     "/notes/{number}": ["/notes/{note}"],
