@@ -30,11 +30,13 @@ from app.loop.tools import verbs
 from app.loop.tools.verbs import CHANGE, OfCorrection, OfTool
 from app.quality.wear.queries import next_event
 from app.settings import Settings
+from app.views.approvals.verbs import APPROVE_ALL, shown_in
+from app.views.approvals.verbs import OfTool as Together
 from app.views.characteristic.glance import band_picture
 from app.views.characteristic.wording import state_word
 from app.views.station import queries, sheet_pages
 from app.views.station.who import REFUSED, asked, who
-from app.views.station.wording import next_action
+from app.views.station.wording import first_sentence, next_action
 from app.web.deps import SESSION_COOKIE, STATION_COOKIE, FormDep, Number, SessionDep, SettingsDep, Word, from_this_site
 from app.web.fields import LARGEST_ID
 from app.web.forms import by_field
@@ -42,7 +44,7 @@ from app.web.limits import FEW, takes
 from app.web.live import Access, stream
 from app.web.paging import address
 from app.web.templates import page
-from app.web.verb import Verb, carry_out, named
+from app.web.verb import Verb, carry_out, named, said
 
 router = APIRouter(prefix="/station", include_in_schema=False)
 router.routes += sheet_pages.router.routes
@@ -124,7 +126,7 @@ def station_page(
         done=_of_machine(session, station.machine.key, done) if done else None,
         late=_of_machine(session, station.machine.key, late) if late else None,
         tool=verbs.done("change", tool) if tool else None,
-        said=verbs.done(decided, n) if decided and n else None,
+        said=said((APPROVE_ALL,), decided, n) or verbs.done(decided, n) if decided and n else None,
         refused=verbs.too_late(session, station.machine, too_late, n) if too_late and n else None,
         written=_beginning_of(session, station.machine.key, note) if note else None,
         offered=verbs.offered,
@@ -136,6 +138,7 @@ def station_page(
             None,
             None if row.stream.last_deviation is None else row.average,  # a mark on the target would pass for a reading
         ),
+        first_sentence=first_sentence,
         next_event=lambda row: next_event(row.outlook),
         wording=alarm_wording,
         outcomes=outcomes,
@@ -220,6 +223,28 @@ def change_tool(
     return RedirectResponse(address(f"/station/{machine}", tool=number), 303)
 
 
+@router.get("/{machine}/tools/{number}/corrections")
+def ask_all(request: Request, session: SessionDep, at: Station, machine: str, number: int) -> Response:
+    """The second touch before all that awaits approval for one tool is approved."""
+    at.must_act()
+    return _ask(request, at, APPROVE_ALL, Together(session, machine_named(session, machine), number, NOBODY))
+
+
+@router.post("/{machine}/tools/{number}/corrections")
+def approve_all(
+    request: Request, session: SessionDep, at: Station, machine: str, number: int, form: FormDep
+) -> Response:
+    """Approve exactly those that were shown; if one of them was decided about meanwhile, none."""
+    on = Together(session, machine_named(session, machine), number, NOBODY, shown_in(form))
+    try:
+        outcome = carry_out(APPROVE_ALL, replace(on, caller=who(request, session, at, form)), form)
+    except REFUSED as error:
+        return _ask(request, at, APPROVE_ALL, on, form, error)
+    if outcome.kind == "late":
+        return RedirectResponse(address(f"/station/{machine}", too_late="approve", n=on.decided.number), 303)
+    return RedirectResponse(address(f"/station/{machine}", decided=APPROVE_ALL.name, n=number), 303)
+
+
 @router.get("/{machine}/corrections/{number}")
 def ask_correction(
     request: Request,
@@ -275,11 +300,13 @@ def _ask(
     request: Request,
     at: AtStation,
     verb: Verb[Any, Any],
-    on: OfTool | OfCorrection,
+    on: OfTool | OfCorrection | Together,
     form: Mapping[str, str] = NO_FORM,
     error: InbandError | None = None,
 ) -> Response:
-    where = f"tools/{on.number}/change" if isinstance(on, OfTool) else f"corrections/{on.number}"
+    where = {OfTool: f"tools/{on.number}/change", Together: f"tools/{on.number}/corrections"}.get(
+        type(on), f"corrections/{on.number}"
+    )
     return page(
         request,
         "station/ask.html",
