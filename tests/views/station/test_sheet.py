@@ -18,9 +18,13 @@ class Sheet:
     def __init__(self, shop: Shop, person: Person) -> None:
         self.shop, self.person, self.here = shop, person, f"/station/{shop.machine}/sizes"
 
-    def send(self, status: int = 200, key: str = NUMBER, **fields: str) -> str:
-        sizes = {f"size:{name}": text for name, text in fields.pop("sizes", {}).items()}  # type: ignore[attr-defined]
-        return html.unescape(self.person.send(self.here, status, key=key, **sizes, **fields))
+    def send(
+        self, status: int = 200, key: str = NUMBER, sizes: dict[str, str] | None = None, sure: str = "", **fields: str
+    ) -> str:
+        """Send sizes by characteristic; sure: what was typed and is confirmed."""
+        named = {f"size:{name}": text for name, text in (sizes or {}).items()}
+        confirmed = {f"sure:{name}": sure for name in named if sure}
+        return html.unescape(self.person.send(self.here, status, **{"key": key, **named, **confirmed, **fields}))
 
     def readings(self, characteristic: str | None = None) -> list[Any]:
         found: list[Any] = self.shop.call(
@@ -87,9 +91,9 @@ def test_a_slip_of_the_finger_is_asked_about_before_a_machine_gets_it(sheet: She
     asked = sheet.send(422, sizes={name: "42.05"})
     assert "42.05 mm is 2.05\xa0mm above the target 40 mm. Really?" in asked
     assert "looks like inches" in sheet.send(422, sizes={name: "1.5748"})
-    assert "20\xa0µm below" in sheet.send(422, sizes={name: "39.98"}, **{f"sure:size:{name}": "42.05"})
+    assert "20\xa0µm below" in sheet.send(422, sizes={name: "39.98"}, sure="42.05")
     assert sheet.readings() == []
-    sheet.send(sizes={name: "39,98"}, **{f"sure:size:{name}": "39,98"})
+    sheet.send(sizes={name: "39,98"}, sure="39,98")
     assert [each["zone"] for each in sheet.readings()] == ["undersize"]
 
 
@@ -134,14 +138,19 @@ def test_sections_are_typed_each_and_judged_together(sheet: Sheet) -> None:
 
 def test_a_viewer_types_nothing(sheet: Sheet, viewer: Person) -> None:
     viewer.open(sheet.here, 403)
-    viewer.send(sheet.here, 403, key=NUMBER, **{f"size:{sheet.shop.characteristic}": "40.001"})
+    viewer.send(sheet.here, 403, **{"key": NUMBER, f"size:{sheet.shop.characteristic}": "40.001"})
     assert sheet.readings() == []
 
 
 def test_one_drawing_at_a_time_in_its_order(sheet: Sheet, operator: Person) -> None:
     shop = sheet.shop
     for key, part in (("z", "flange"), ("a", "flange"), ("b", "cover")):
-        body = {"key": f"{shop.characteristic}-{key}", "name": f"Size {key}", "machine": shop.machine, "part": part}
+        body: dict[str, Any] = {
+            "key": f"{shop.characteristic}-{key}",
+            "name": f"Size {key}",
+            "machine": shop.machine,
+            "part": part,
+        }
         parameters = shop.call("GET", f"/characteristics/{shop.characteristic}")["parameters"]
         shop.call("POST", "/characteristics", 201, **body, parameters=parameters)
     text = operator.open(f"{sheet.here}?of=flange")
