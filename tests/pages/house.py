@@ -30,6 +30,7 @@ PAGES = {
     "/notes": ["/notes", "/notes?machine={machine}", "/notes?characteristic={characteristic}"],
     "/notes/new": ["/notes/new?machine={machine}", "/notes/new?characteristic={characteristic}&sequence=3"],
     "/notes/{number}": ["/notes/{note}"],
+    "/station/{machine}/tools/{number}/corrections": ["/station/{machine}/tools/5/corrections"],
     "/station/{machine}/tools/{number}/change": ["/station/{machine}/tools/3/change"],
     "/characteristics/{characteristic}": [
         "/characteristics/{characteristic}",
