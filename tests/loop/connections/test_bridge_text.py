@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pytest
 
+from app.bridge.certificates import write_pair
 from app.bridge.configuration import configuration_from
 from app.loop.connections.bridge_text import KINDS, Known, configuration, kinds
 from tests.shop import Person, Shop
@@ -14,8 +15,10 @@ from tests.shop import Person, Shop
 
 @pytest.mark.parametrize("kind", KINDS)
 def test_a_bridge_reads_what_is_copied(kind: str, tmp_path: Path) -> None:
-    for name in ("lathe-1.key", "lathe-1.password", "inband-bridge.der", "inband-bridge.pem"):
+    for name in ("lathe-1.key", "lathe-1.password"):
         (tmp_path / name).write_text(f"inband_{name}")
+    if kind == "opcua":
+        write_pair(tmp_path, "cell-pc")
     known = Known("lathe-1", "https://inband.plant.example", ["seat", "bore"], [3, 4], "Europe/Belgrade")
     read = configuration_from(tomllib.loads(configuration(kind, known)), tmp_path)
     (machine,) = read.machines
