@@ -50,7 +50,7 @@ KINDS = tuple(_OWN)
 
 
 class Known(NamedTuple):
-    """What is known of a machine here. characteristics: keys; tools: R10 of those that are corrected; zone: of the plant."""
+    """A machine as it is known here. characteristics: keys; tools: R10 of those that are corrected; zone: of the plant."""
 
     machine: str
     server: str

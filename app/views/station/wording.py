@@ -7,7 +7,7 @@ from app.views.station.queries import Station
 
 
 def first_sentence(text: str) -> str:
-    """What is read from two metres of a reason; the rest of it is where there is time to read.
+    """The part of a reason that is read from two metres; the rest of it is where there is time to read.
 
     >>> first_sentence("Deviation 6.0 µm is beyond 5.0 µm: corrected in full. The part was cut before it.")
     'Deviation 6.0 µm is beyond 5.0 µm: corrected in full.'
