@@ -4,6 +4,7 @@ from markupsafe import Markup, escape
 
 from app.core.spc.capability import CAPABLE, VERY_CAPABLE, Index
 from app.language.i18n import _
+from app.quality.capability.tables import CapabilityVerdict
 from app.quality.capability.wording import between, index
 
 WIDTH, HEIGHT, MOST = 260.0, 28.0, 3.0
@@ -28,3 +29,10 @@ def interval(found: Index, *, allowed: bool = True) -> Markup:
         f'<path class="reach" d="M{x(low):.1f} {HEIGHT / 2:g}H{x(high):.1f}"/>'
         f'<circle class="dot" cx="{x(found.value):.1f}" cy="{HEIGHT / 2:g}" r="5"/></svg>'
     )
+
+
+def stored_interval(verdict: CapabilityVerdict) -> Markup:
+    """The index that the periodic job stored; nothing where none may be quoted. A preliminary one is drawn hollow."""
+    if verdict.value is None:
+        return Markup()
+    return interval(Index(verdict.value, verdict.low, verdict.high, None), allowed=not verdict.preliminary)

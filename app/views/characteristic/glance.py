@@ -122,3 +122,37 @@ def sparkline(deviations: Sequence[float], limits: HasLimits) -> Markup:
     return Markup(  # noqa: S704 - as above
         f'<svg class="sparkline" viewBox="0 0 {width:g} {height:g}" preserveAspectRatio="none" role="img" aria-label="{escape(label)}">{"".join(parts)}</svg>'
     )
+
+
+def tolerance_bar(deviations: Sequence[float], limits: HasLimits) -> Markup:
+    """The tolerance used: from the smallest to the largest of the deviations (mm) as a bar, the newest as a line, between the limits.
+
+    One and a half times the tolerance is wide enough: what lies further out is drawn at the edge.
+    """
+    width, height, beyond = 200.0, 20.0, 1.5
+    borders, natural = Limits.of(limits), natural_of(limits)
+    tolerance = max(half_of(limits), 1e-6)
+    low = -BEYOND if natural.side < 0 else -beyond
+    high = BEYOND if natural.side > 0 else beyond
+
+    def x(deviation: float) -> float:
+        return 2 + (max(low, min(high, deviation / tolerance)) - low) / (high - low) * (width - 4)
+
+    judged = tolerance_about_target(tolerance, natural).judged
+    parts = [f'<path class="edge" d="M{x(limit):.1f} 1V{height - 1:g}"/>' for limit in judged]
+    parts.append(f'<path class="target" d="M{x(0):.1f} 1V{height - 1:g}"/>')
+    label = _("No reading yet")
+    if deviations:
+        least, most = min(deviations), max(deviations)
+        outside = not (within_tolerance(least, borders) and within_tolerance(most, borders))
+        wide, state = x(most) - x(least) + 2, " outside" if outside else ""
+        parts += [
+            f'<rect class="used{state}" x="{x(least) - 1:.1f}" y="6" width="{wide:.1f}" height="{height - 12:g}"/>',
+            f'<path class="last" d="M{x(deviations[-1]):.1f} 3V{height - 3:g}"/>',
+        ]
+        label = _(
+            "The last {n} deviations lie between {least} and {most}; the tolerance is {tolerance} about the target"
+        ).format(n=len(deviations), least=um(least), most=um(most), tolerance=f"±{um(tolerance).removeprefix('+')}")
+    return Markup(  # noqa: S704 - as above
+        f'<svg class="tolerance-bar" viewBox="0 0 {width:g} {height:g}" role="img" aria-label="{escape(label)}">{"".join(parts)}</svg>'
+    )

@@ -19,6 +19,9 @@ def get_overview(
     session: SessionDep,
     machine: Annotated[str | None, Query(description="Only of this machine.", examples=["lathe-1"])] = None,
     by: Annotated[By, Query(description="What they are ranked by.")] = By.ATTENTION,
+    reverse: Annotated[
+        bool, Query(description="The worst last. What has no value, such as no index, stands at the end either way.")
+    ] = False,
     after: Annotated[int, Query(ge=0, le=1_000_000, description="`next` of the page before.")] = 0,
     limit: Annotated[int, Query(ge=1, le=1000, description="How many at most.")] = 100,
 ) -> Overview:
@@ -26,4 +29,4 @@ def get_overview(
 
     The order is of this moment: a characteristic may change its place between two pages.
     """
-    return Overview.of(queries.ranking(session, machine=machine, by=by), after, limit)
+    return Overview.of(queries.ranking(session, machine=machine, by=by, reverse=reverse), after, limit)

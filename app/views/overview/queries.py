@@ -4,7 +4,7 @@ from collections import Counter
 from dataclasses import dataclass
 from datetime import UTC, datetime, timedelta
 from enum import StrEnum
-from math import inf
+from typing import Any
 
 from sqlalchemy import func, select
 from sqlalchemy.orm import Session
@@ -33,6 +33,13 @@ class By(StrEnum):
     WEAR = "wear"
     SIGNALS = "signals"
     ALARMS = "alarms"
+    NAME = "name"
+    LAST = "last"
+
+    @property
+    def largest_first(self) -> bool:
+        """True if what is worst by it is what is largest, which comes first."""
+        return self in {By.SIGNALS, By.ALARMS}
 
 
 @dataclass(frozen=True)
@@ -47,9 +54,14 @@ class Ranked:
 
 
 def ranking(
-    session: Session, *, machine: str | None = None, by: By = By.ATTENTION, now: datetime | None = None
+    session: Session,
+    *,
+    machine: str | None = None,
+    by: By = By.ATTENTION,
+    reverse: bool = False,
+    now: datetime | None = None,
 ) -> list[Ranked]:
-    """Every characteristic of the plant, or of one machine, the most urgent first. Raises `NotFound`."""
+    """Every characteristic of the plant, or of one machine, the worst first, or last. Raises `NotFound`."""
     now = now or datetime.now(UTC)
     groups = plant.plant(session, machine=machine)
     only = groups[0].machine.id if machine is not None else None
@@ -76,19 +88,29 @@ def ranking(
                 failing=number in failing,
             )
             entries.append(Ranked(group.machine, row, inputs, list(open_signals.get(number, ())), index))
-    return sorted(entries, key=lambda entry: _order(entry, by))
+    return in_order(entries, by, reverse=reverse)
 
 
-def _order(ranked: Ranked, by: By) -> tuple[float, ...]:
-    inputs = ranked.inputs
-    first = {
-        By.ATTENTION: 0.0,
-        By.PPK: inf if inputs.ppk is None else inputs.ppk,
-        By.WEAR: inf if inputs.parts_left is None else inputs.parts_left,
-        By.SIGNALS: -float(inputs.signals),
-        By.ALARMS: -inputs.per_shift,
+def in_order(entries: list[Ranked], by: By, *, reverse: bool = False) -> list[Ranked]:
+    """Sorted, the worst first, or last; those alike by their need for attention. What has no value stands at the end either way."""
+    urgent = sorted(entries, key=lambda entry: entry.inputs.rank)
+    if by is By.ATTENTION:
+        return urgent[::-1] if reverse else urgent
+    known = [entry for entry in urgent if _value(entry, by) is not None]
+    known.sort(key=lambda entry: _value(entry, by), reverse=reverse != by.largest_first)
+    return known + [entry for entry in urgent if _value(entry, by) is None]
+
+
+def _value(ranked: Ranked, by: By) -> Any:
+    inputs, row = ranked.inputs, ranked.row
+    return {
+        By.PPK: inputs.ppk,
+        By.WEAR: inputs.parts_left,
+        By.SIGNALS: inputs.signals,
+        By.ALARMS: inputs.per_shift,
+        By.NAME: row.characteristic.name.casefold(),
+        By.LAST: row.stream.last_received_at,
     }[by]
-    return (first, *inputs.rank)
 
 
 def _raised(session: Session, machine_id: int | None, now: datetime) -> Counter[int]:

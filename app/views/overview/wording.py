@@ -17,6 +17,16 @@ class Reason(NamedTuple):
     href: str
     tone: str
 
+    @property
+    def urgent(self) -> bool:
+        """True if the list shows it in colour: somebody is needed now."""
+        return self.reason <= AttentionReason.NOT_EVALUATED
+
+    @property
+    def is_state(self) -> bool:
+        """True if it says no more than the state does."""
+        return self.reason <= AttentionReason.OUTSIDE
+
 
 def reasons(ranked: Ranked) -> list[Reason]:
     """The most urgent first."""

@@ -11,7 +11,7 @@
 //         shows them). Where a swap has moved the items, a touch counts only when they have stood still for a moment
 //
 // What the reader is doing is kept: focus, selection, opened <details> (those with an id or data-key), scrolling.
-// While he types in it, presses something in it or has a dialog of it open, it waits. If fetching fails it says so and how
+// While he types in it, presses something in it or has a dialog or a popover of it open, it waits. If fetching fails it says so and how
 // old the content is.
 // Fires "livepart" (bubbles) after each swap.
 
@@ -88,7 +88,7 @@ class LivePart extends HTMLElement {
     const active = document.activeElement;
     const typing = this.contains(active) && active.matches("input:not([type=hidden]), textarea, select");
     const pressing = performance.now() - this.pressed < PRESS;
-    return typing || pressing || this.querySelector("dialog[open]") !== null;
+    return typing || pressing || this.querySelector("dialog[open], :popover-open") !== null;
   }
 
   async load() {

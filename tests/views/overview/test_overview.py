@@ -1,11 +1,13 @@
 """The ranking of the whole plant, over REST."""
 
+import re
 from datetime import UTC, datetime, timedelta
 from typing import Any
 
 import pytest
+from playwright.sync_api import Page, expect
 
-from tests.shop import Shop
+from tests.shop import Person, Shop
 
 SPREAD = ((1 + 0.3**2 + 1.4**2 + 0.6**2) / 4 * 24 / 23) ** 0.5
 
@@ -82,6 +84,63 @@ def test_it_can_be_ranked_by_one_number_and_read_page_by_page(ranking: Shop) -> 
     assert [item["characteristic"] for item in first["items"] + rest["items"]] == [
         item["characteristic"] for item in by_ppk
     ]
+
+
+def test_every_column_sorts_either_way_and_what_has_no_value_stays_at_the_end(ranking: Shop) -> None:
+    best = [item["ppk"] for item in ranked(ranking, by="ppk", reverse="true")]
+    known = [value for value in best if value is not None]
+    assert known == sorted(known, reverse=True)
+    assert best[len(known) :] == [None] * (5 - len(known))
+    names = [item["name"].casefold() for item in ranked(ranking, by="name")]
+    assert names == sorted(names)
+    assert [item["key"] for item in ranked(ranking, by="last")][-1] == ranking.characteristic, "never measured"
+    assert ranked(ranking, reverse="true")[-1]["key"] == "broken"
+    assert ranked(ranking, by="alarms")[0]["key"] == "narrow"
+
+
+def test_a_line_of_the_page_has_pictures_and_its_words_on_demand(ranking: Shop, viewer: Person) -> None:
+    opened = viewer.open(f"/overview?machine={ranking.machine}")
+    (line,) = re.findall(rf'<tr id="c-{ranking.machine}-wide".*?</tr>', opened, re.DOTALL)
+    assert line.count('class="interval') == 1
+    assert line.count('class="sparkline"') == 1
+    assert "Not capable" in line
+    assert line.index("24 readings, 1 to 24") > line.index(" popover "), (
+        "the window of the index is in the words, not in the line"
+    )
+    order = re.findall(r'<tr id="c-([^"]+)"', viewer.open(f"/overview?machine={ranking.machine}&by=ppk&reverse=true"))
+    assert order == [item["characteristic"] for item in ranked(ranking, by="ppk", reverse="true")]
+
+
+def test_the_characteristics_of_a_part_show_the_tolerance_they_use(ranking: Shop, viewer: Person) -> None:
+    ranking.call("PATCH", f"/characteristics/{ranking.machine}-wide", part="Ring 7")
+    opened = viewer.open("/overview?part=Ring%207")
+    assert re.findall(r'<tr id="c-([^"]+)"', opened) == [f"{ranking.machine}-wide"]
+    assert (
+        "The last 24 deviations lie between −7.0 µm and +7.0 µm; the tolerance is ±8.0 µm about the target"
+        in opened.replace("\xa0", " ")
+    )
+    assert "No characteristic belongs to the part" in viewer.open("/overview?part=Ring%208")
+
+
+@pytest.mark.browser
+def test_thirty_lines_are_on_a_screen_and_words_open_by_touch(ranking: Shop, viewer: Person, page: Page) -> None:
+    viewer.sign_in(page)
+    page.set_viewport_size({"width": 1280, "height": 800})
+    page.goto(f"/overview?machine={ranking.machine}")
+    rows = page.locator(".ranking tbody tr")
+    expect(rows).to_have_count(5)
+    top, height = page.evaluate(
+        "() => { const rows = [...document.querySelectorAll('.ranking tbody tr')].map(row => row.getBoundingClientRect());"
+        " return [rows[0].top, Math.max(...rows.map(row => row.height))]; }"
+    )
+    assert top + 30 * height <= 800, (top, height)
+    words = page.locator(f"#why-{ranking.machine}-wide")
+    expect(words).to_be_hidden()
+    page.locator(f"#c-{ranking.machine}-wide .why > button").click()
+    expect(words).to_be_visible()
+    expect(words).to_contain_text("24 readings, 1 to 24")
+    page.keyboard.press("Escape")
+    expect(words).to_be_hidden()
 
 
 def test_a_machine_that_is_not_there_is_404(ranking: Shop) -> None:
