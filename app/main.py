@@ -98,7 +98,7 @@ from app.quality.what_if import api as what_if
 from app.quality.what_if import pages as what_if_pages
 from app.settings import Settings
 from app.views.approvals import pages as queue_pages
-from app.views.characteristic import capability_pages, figures_api
+from app.views.characteristic import capability_pages, figures_api, six_pack
 from app.views.characteristic import pages as characteristic_pages
 from app.views.compare import api as compare
 from app.views.compare import pages as compare_pages
@@ -200,6 +200,7 @@ ROUTERS: tuple[APIRouter, ...] = (
     what_if_pages.router,
     signals_pages.router,
     capability_pages.router,
+    six_pack.router,
     alarm_pages.router,
     note_pages.router,
     queue_pages.router,

@@ -70,6 +70,11 @@ PAGES = {
         "/characteristics/{characteristic}-watched/capability?last=all&side=upper",
         "/characteristics/{characteristic}-empty/capability",
     ],
+    "/characteristics/{characteristic}/six-pack": [
+        "/characteristics/{characteristic}/six-pack",
+        "/characteristics/{characteristic}-watched/six-pack?last=all",
+        "/characteristics/{characteristic}-empty/six-pack",
+    ],
     "/gauges": ["/gauges", "/gauges?machine={machine}", "/gauges?characteristic={characteristic}"],
     "/gauges/new": [
         "/gauges/new",

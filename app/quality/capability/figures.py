@@ -118,6 +118,17 @@ def probability(drawn: CapabilityChart) -> Chart:
     return _chart([*marks, *_limit_lines(drawn, low, high, percentiles=False), *_beyond(drawn)], low, high, shares)
 
 
+def small(chart: Chart) -> Chart:
+    """The same without a legend, for which there is no room."""
+    panels = [
+        replace(
+            panel, marks=[replace(mark, name="") if isinstance(mark, Series | Bars) else mark for mark in panel.marks]
+        )
+        for panel in chart.panels
+    ]
+    return replace(chart, panels=panels, room=Room(78, 22, 54, 40))
+
+
 def _near(drawn: CapabilityChart) -> Floats:
     """The readings that the picture shows: those far from all others would leave nothing to be seen of the rest."""
     return np.asarray(drawn.values[~far_off(drawn.values)])

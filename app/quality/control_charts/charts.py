@@ -32,7 +32,7 @@ from app.quality.control_charts.series_queries import Whole, read
 from app.quality.control_charts.tables import Baseline
 from app.quality.control_charts.view import Marks, View, only, since
 
-__all__ = ["Marks", "View", "kinds", "marked_by", "only", "unjudged", "view"]
+__all__ = ["Marks", "View", "kinds", "marked_by", "only", "unjudged", "unjudged_ranges", "view"]
 NEIGHBOURS = (
     100  # points before the window that are looked at too: runs of points go on, and the one before may be excluded
 )
@@ -136,6 +136,17 @@ def unjudged(session: Session, current: CurrentCharacteristic, window: Window) -
     plain = Baseline(quantity=Quantity.DEVIATION.value, excluded=[], first_sequence=1, last_sequence=0, factor=-1.0)
     readings = read(session, current, plain, window)
     return replace(of_series(readings.series, Quantity.DEVIATION), left_out=readings.left_out)
+
+
+def unjudged_ranges(plain: View) -> View:
+    """Moving ranges of readings as they are, without limits; none over a change of tool or of the reference."""
+    neighbours = ~plain.begins[1:]
+    ranges = shewhart.moving_ranges(shewhart.given(0.0, 1.0), plain.points).points if len(plain) > 1 else np.zeros(0)
+    last, begins = plain.last[1:][neighbours], plain.begins[1:][neighbours]
+    sizes = np.full(len(last), 2)
+    return View(
+        Chart.MOVING_RANGE, plain.quantity, last, last, sizes, ranges[neighbours], begins, left_out=plain.left_out
+    )
 
 
 def of_series(series: Series, which: Quantity) -> View:
