@@ -129,7 +129,7 @@ def _made(database: "Database", keys: Sequence[str], bundle: "Bundle", request: 
             try:
                 with database.begin() as session:
                     current = characteristics.characteristic_named(session, key)
-                    report = queries.report_of(session, current, request, datetime.now(UTC))
+                    report = queries.report_of(session, current, request, datetime.now(UTC), getpass.getuser())
                     actor, subject = f"command line ({getpass.getuser()})", f"characteristic/{key}"
                     record(session, actor, "report written", subject, after={"format": bundle.form})
                 parts.append(Part(key, bundle.part(report), None))

@@ -11,7 +11,7 @@ Modules keep to what is read here: ``import "./x.js"`` and ``import { a, b } fro
 import re
 from collections.abc import Mapping
 
-SHEETS = ("tokens", "base", "components", "forms", "charts", "forced")
+SHEETS = ("tokens", "base", "components", "forms", "charts", "forced", "print")
 """The style sheets of every page, in their order."""
 JOINED_SHEET = "css/inband.css"
 EVERYWHERE = "js/inband.js"

@@ -221,7 +221,10 @@ class Picture:
 
 @dataclass(frozen=True, slots=True)
 class Section:
-    """One part of a report. `warnings` are sentences that the numbers should not be read without."""
+    """One part of a report. `warnings` are sentences that the numbers should not be read without.
+
+    signatures: what people sign; a section with places for them is a page of its own, with a place for a logo.
+    """
 
     key: str
     title: str
@@ -230,6 +233,7 @@ class Section:
     facts: tuple[Fact, ...] = ()
     table: Table | None = None
     pictures: tuple[Picture, ...] = ()
+    signatures: tuple[str, ...] = ()
 
     def fact(self, key: str) -> Value:
         """The value of one fact."""
@@ -240,7 +244,7 @@ class Section:
 class Report:
     """A characteristic and a period. `zone` names the time zone in which moments are read.
 
-    warnings: what is above everything else.
+    warnings: what is above everything else. made_by: who asked for it; empty where a program did.
     """
 
     key: str
@@ -253,6 +257,17 @@ class Report:
     head: tuple[Fact, ...]
     sections: tuple[Section, ...]
     warnings: tuple[str, ...] = ()
+    made_by: str = ""
+
+    @property
+    def made(self) -> str:
+        """Sentence about who made it, when, and by which clock its times are."""
+        sentence = (
+            _("Made at {at} by {who}; times are those of {zone}.")
+            if self.made_by
+            else _("Made at {at}; times are those of {zone}.")
+        )
+        return sentence.format(at=self.words(self.made_at), who=self.made_by, zone=self.zone)
 
     def words(self, value: Value) -> str:
         """A value as people read it."""

@@ -5,13 +5,11 @@ from typing import Annotated, Literal
 from fastapi import Query, Response
 
 from app.access.deps import AnyCaller
-from app.core.spc.fitting import Fitted
 from app.core.spc.machine_performance import RUN
-from app.core.spc.refusal import Refused
 from app.loop.characteristics import queries as characteristics
-from app.quality.capability.figures import CapabilityChart, histogram, probability
+from app.quality.capability.chart import drawn
+from app.quality.capability.figures import histogram, probability
 from app.quality.capability.machine_queries import newest_run
-from app.quality.capability.queries import Study
 from app.quality.capability.request import StudyRequestDep, study_of
 from app.quality.capability.schemas import (
     CapabilityOut,
@@ -23,23 +21,6 @@ from app.web.api import FIGURE, CharacteristicKey, Theme, api_router, chart_answ
 from app.web.deps import FROM_REPLICA, SessionDep
 
 router = api_router("statistics", FROM_REPLICA)
-
-
-def drawn(study: Study) -> CapabilityChart:
-    """Values of the capability figure."""
-    result = None if isinstance(study.indices, Refused) else study.indices
-    fitted = study.by_fit if isinstance(study.by_fit, Fitted) else None
-    by_percentile = fitted or (None if isinstance(study.by_percentile, Refused) else study.by_percentile)
-    return CapabilityChart(
-        study.values,
-        study.limits,
-        result.mean if result else None,
-        result.overall.value if result else None,
-        result.within.value if result and study.potential_allowed else None,
-        (by_percentile.low, by_percentile.median, by_percentile.high) if by_percentile else None,
-        study.normal or result is None,
-        fitted,
-    )
 
 
 @router.get("/characteristics/{characteristic}/capability", responses=problems(404))

@@ -9,14 +9,14 @@ from markupsafe import Markup
 from sqlalchemy.orm import Session
 
 from app.access.deps import require
-from app.charts import Axis, Chart, Dots, Panel, Pen, Room, Rule, Series, nothing, reading_axis, svg, to_drawing
+from app.charts import Axis, Chart, Dots, Mark, Panel, Pen, Room, Rule, Series, nothing, reading_axis, svg, to_drawing
 from app.core.spc.quantity import Quantity
 from app.core.spc.refusal import Refused
 from app.language.i18n import _
 from app.loop.characteristics import queries as characteristics
 from app.loop.characteristics.queries import CurrentCharacteristic
 from app.quality.capability import figures, wording
-from app.quality.capability.api import drawn
+from app.quality.capability.chart import drawn
 from app.quality.capability.pictures import interval
 from app.quality.capability.queries import USUAL, Study
 from app.quality.capability.request import StudyRequest, study_of
@@ -143,7 +143,7 @@ def last_readings(study: Study) -> Chart:
     inside = [all((value >= limit) if limit < 0 else (value <= limit) for limit in limits) for value in values]
     low, high = min(*limits, 0.0, *values), max(*limits, 0.0, *values)
     edge = 0.06 * (high - low) or 1.0
-    marks = [
+    marks: list[Mark] = [
         Rule(Pen("quiet", 1, "4px,4px"), y=0.0, words=_("target")),
         *(Rule(Pen("ink", 2), y=limit, words=_("lower limit") if limit < 0 else _("upper limit")) for limit in limits),
         Series(

@@ -75,7 +75,7 @@ ReportQuery = Annotated[ReportRequest, Depends(request_from_query)]
 def report_for(session: SessionDep, caller: Caller, characteristic: str, report_request: ReportRequest) -> Report:
     """The report, if the caller may see it."""
     current = characteristics.characteristic_for(session, caller, characteristic, "viewer")
-    return queries.report_of(session, current, report_request, datetime.now(UTC))
+    return queries.report_of(session, current, report_request, datetime.now(UTC), caller.name)
 
 
 @router.get("/characteristics/{characteristic}/report.json", responses=problems(404))

@@ -8,7 +8,7 @@ from urllib.parse import urlencode
 from fastapi import APIRouter, Query, Request, Response
 from markupsafe import Markup
 
-from app.access.deps import require
+from app.access.deps import Viewer
 from app.charts import svg, to_drawing
 from app.errors import InbandError, Invalid
 from app.files.documents.content import Format, Paper, Picture
@@ -30,10 +30,11 @@ RUNS = ("200", "1000", "5000", "all")
 FIELDS = ("from", "to", "last", "timezone", "paper")
 
 
-@router.get("/characteristics/{characteristic}/report", dependencies=[require("viewer")])
+@router.get("/characteristics/{characteristic}/report")
 def report_page(
     request: Request,
     session: SessionDep,
+    caller: Viewer,
     characteristic: str,
     section: Annotated[list[str] | None, Query()] = None,
 ) -> Response:
@@ -49,7 +50,7 @@ def report_page(
         report_request, problem = typed(typed_fields, section or ()), None
     except Invalid as error:
         report_request, problem = ReportRequest(), error
-    report = None if problem else queries.report_of(session, current, report_request, datetime.now(UTC))
+    report = None if problem else queries.report_of(session, current, report_request, datetime.now(UTC), caller.name)
     failing = proof.failing()
     return page(
         request,

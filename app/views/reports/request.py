@@ -26,6 +26,7 @@ EVERYTHING = 2**62
 class SectionName(StrEnum):
     """The sections, in the order in which they stand."""
 
+    SUMMARY = "summary"
     NUMBERS = "numbers"
     CAPABILITY = "capability"
     CHART = "chart"

@@ -127,9 +127,10 @@ class ReportWorker:
         with self._database.begin() as session:
             if not actions.begin(session, number, token, key):
                 return False
+            by = queries.job(session, number).asked_by
         content, trouble = None, None
         try:
-            content = bundle.part(self._report(bundle, key, must_see))
+            content = bundle.part(self._report(bundle, key, by, must_see))
         except InbandError as error:
             trouble = f"{error.detail} {error.what_to_do or ''}".strip()
         except Exception as error:
@@ -140,17 +141,17 @@ class ReportWorker:
         with self._database.begin() as session:
             return actions.keep(session, number, token, place, key, content, trouble)
 
-    def _report(self, bundle: Bundle, key: str, must_see: MustSee) -> Report:
+    def _report(self, bundle: Bundle, key: str, by: str, must_see: MustSee) -> Report:
         """The report of one characteristic, read from the standby if it will do."""
         reading = self._replica.begin(must_see) if self._replica else None
         if self._replica is not None and reading is not None:
             try:
                 with reading:
-                    return _report_of(reading, bundle, key)
+                    return _report_of(reading, bundle, key, by)
             except DBAPIError as error:  # it has ended the query, or is gone
                 self._replica.failed(error)
         with self._database.begin() as session:
-            return _report_of(session, bundle, key)
+            return _report_of(session, bundle, key, by)
 
     def _pack(self, number: int, token: str, bundle: Bundle) -> None:
         with self._database.begin() as session:
@@ -173,9 +174,9 @@ class ReportWorker:
             actions.finish(session, number, token, file_name(number, bundle.form), whole)
 
 
-def _report_of(session: Session, bundle: Bundle, key: str) -> Report:
+def _report_of(session: Session, bundle: Bundle, key: str, by: str) -> Report:
     current = characteristics.characteristic_named(session, key)
-    return queries.report_of(session, current, bundle.request, datetime.now(UTC))
+    return queries.report_of(session, current, bundle.request, datetime.now(UTC), by)
 
 
 def _taken(ours: "psycopg.Connection[tuple[object, ...]]", number: int) -> bool:

@@ -171,6 +171,29 @@ def test_the_pdf_shows_every_value_in_the_same_words(story: Shop, whole: Any) ->
         assert f"({story.characteristic})" in page.extract_text(), "every page says what it is about"
 
 
+def test_the_first_page_is_what_is_signed_and_the_rest_are_appendices(story: Shop, whole: Any) -> None:
+    first, second = (page.extract_text() for page in PdfReader(io.BytesIO(file(story, "pdf"))).pages[:2])
+    summary = next(each for each in whole["sections"] if each["key"] == "summary")
+    assert (
+        summary["facts"][1]["value"] == facts(whole, "capability")["ppk"]["value"]
+        or summary["facts"][0]["value"] == "No number"
+    )
+    for said in (
+        "Summary",
+        "Verdict",
+        "Made by, date",
+        "Checked by, date",
+        "Released by, date",
+        "Logo",
+        "by key a test",
+    ):
+        assert said in first
+    assert "Decided in zone" not in first
+    assert "Decided in zone" in second
+    only = PdfReader(io.BytesIO(file(story, "pdf", "last=all&section=summary"))).pages
+    assert len(only) == 1
+
+
 def test_the_page_shows_every_value_in_the_same_words(story: Shop, whole: Any, viewer: Person) -> None:
     from html import unescape
 

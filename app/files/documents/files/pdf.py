@@ -18,6 +18,7 @@ from reportlab.platypus import (
     Flowable,
     KeepTogether,
     LongTable,
+    PageBreak,
     Paragraph,
     SimpleDocTemplate,
     Spacer,
@@ -95,10 +96,7 @@ class _Numbered(Canvas):
         self.setStrokeColor(RULE)
         self.setLineWidth(0.75)
         self.line(left, top - 18, right, top - 18)
-        created = _("Made at {at}; times are those of {zone}.").format(
-            at=report.words(report.made_at), zone=report.zone
-        )
-        self._words(left, 10 * mm, created, 8, QUIET, right - left - 60)
+        self._words(left, 10 * mm, report.made, 8, QUIET, right - left - 60)
         pages = _("{page} of {pages}").format(page=number, pages=of)
         self._words(right - width_of(pages, 8), 10 * mm, pages, 8, QUIET, 60)
 
@@ -138,9 +136,12 @@ NAME, VALUE = _style("name", 8, 10.5, textColor=QUIET), _style("value", 8, 10.5,
 
 
 def _head(report: Report, width: float) -> list[Flowable]:
+    title: list[Flowable] = [Paragraph(markup(report.name), TITLE), Paragraph(markup(report.period), TEXT)]
+    if any(section.signatures for section in report.sections):
+        logo = Grid([[Paragraph(markup(_("Logo")), TEXT)]], colWidths=[LOGO[0]], rowHeights=[LOGO[1]], style=_EMPTY)
+        title = [Grid([[title, logo]], colWidths=[width - LOGO[0], LOGO[0]], style=_BESIDE)]
     return [
-        Paragraph(markup(report.name), TITLE),
-        Paragraph(markup(report.period), TEXT),
+        *title,
         *(Paragraph(f"▲ {markup(warning)}", WARNING) for warning in report.warnings),
         Spacer(0, 6),
         _facts(report, report.head, width, 2),
@@ -168,6 +169,13 @@ def _section(report: Report, section: Section, width: float) -> list[Flowable]:
         story += [Spacer(0, 5), _table(report, table, width)]
     if table is not None and table.more:
         story.append(Paragraph(markup(_("… and {n} older ones.").format(n=table.more)), TEXT))
+    if section.signatures:
+        gap, one = 14.0, (width - 14.0 * (len(section.signatures) - 1)) / len(section.signatures)
+        places = [Paragraph(markup(name), TEXT) for name in section.signatures]
+        cells = [cell for place in places for cell in (place, "")][:-1]
+        widths = [size for _place in places for size in (one, gap)][:-1]
+        rules = [("LINEABOVE", (2 * at, 0), (2 * at, 0), 0.6, INK) for at in range(len(places))]
+        story += [Spacer(0, 34), Grid([cells], colWidths=widths, style=TableStyle(rules)), PageBreak()]
     # A heading stands with what it is the heading of; names and values are read downward, so they are not parted either.
     return [KeepTogether(begin), *story] if section.facts else [CondPageBreak(_least(section, width)), *begin, *story]
 
@@ -184,6 +192,8 @@ def _chart(picture: Picture, width: float) -> Flowable:
     return Chart(to_drawing(picture.figure, picture.width, picture.height), width)
 
 
+LOGO = (42 * mm, 16 * mm)
+_EMPTY = TableStyle([("BOX", (0, 0), (-1, -1), 0.6, RULE, None, (3, 2)), ("VALIGN", (0, 0), (-1, -1), "MIDDLE")])
 _BESIDE = TableStyle([
     ("VALIGN", (0, 0), (-1, -1), "TOP"),
     ("LEFTPADDING", (0, 0), (-1, -1), 0),

@@ -119,17 +119,15 @@ class _Writing:
         zone = ZoneInfo(report.zone)
         sheet.write_string(0, 0, report.name, self.title)
         sheet.write_string(1, 0, report.period, self.quiet)
-        created = _("Made at {at}; times are those of {zone}.").format(
-            at=report.words(report.made_at), zone=report.zone
-        )
-        sheet.write_string(2, 0, created, self.quiet)
+        sheet.write_string(2, 0, report.made, self.quiet)
         for at, warning in enumerate(report.warnings, start=3):
             sheet.write_string(at, 0, warning, self.warning)
         row = self.facts(sheet, 4 + len(report.warnings), report.head, zone)
         pictures: list[Picture] = []
         for section in report.sections:
             row = self.section(sheet, row + 1, section, zone, apart=apart)
-            pictures += section.pictures
+            if not section.signatures:  # the charts of the first page are those of its appendices
+                pictures += section.pictures
             if section.table is not None and apart:
                 self.table(self.sheet(section.title), 0, section.table, zone, alone=True)
         sheet.set_column(0, 0, 44)

@@ -8,7 +8,6 @@ from app.language.i18n import _
 from app.loop.summaries import wording as statistics
 from app.quality.capability import fit_wording as fits
 from app.quality.capability import machine_wording, wording
-from app.quality.capability import queries as capabilities
 from app.quality.capability.machine_queries import newest_run
 from app.quality.capability.queries import Study
 from app.views.reports.queries.frame import Frame
@@ -18,23 +17,13 @@ FEW = 100  # of a million: more than these are reported without decimals
 
 def capability(frame: Frame) -> Section:
     """Cp, Cpk, Pp, Ppk and Cpm with intervals; of a corrected process also of the tool without corrections."""
-    study = capabilities.capability_of(frame.session, frame.current, frame.window, sigma_by=frame.request.sigma_by)
+    study = frame.study
     title = _("Capability")
     if isinstance(study.indices, Refused):
         why = _("No capability: {why}").format(why=statistics.refusal(study.indices))
         return Section("capability", title, warnings=(why,))
-    word, _tone = wording.verdict(study.quoted)
-    if study.quote == "none":
-        verdict = _("Do not report an index: {why}.").format(why=wording.why_not(study.quoting.why))
-    else:
-        verdict = _("{verdict}: report {index} = {value}. Intervals hold with {confidence} confidence.").format(
-            verdict=word,
-            index=wording.index_name(study.quote),
-            value=wording.index(study.quoted),
-            confidence=f"{study.confidence * 100:g}\N{NO-BREAK SPACE}%",
-        )
     sentences = [
-        verdict,
+        verdict(study),
         _("Of {window}.").format(window=wording.window_of(study)),
         machine_wording.tolerance(study.tolerance),
         wording.stability(study.stability, study.baseline),
@@ -51,6 +40,19 @@ def capability(frame: Frame) -> Section:
         sentences=tuple(sentences),
         warnings=tuple(wording.cautions(study)),
         facts=(*_indices(study), *_machine(frame, study), *_spread(study), *_without(study)),
+    )
+
+
+def verdict(study: Study) -> str:
+    """The index to report, with the word for it; or why none is."""
+    if study.quote == "none":
+        return _("Do not report an index: {why}.").format(why=wording.why_not(study.quoting.why))
+    word, _tone = wording.verdict(study.quoted)
+    return _("{verdict}: report {index} = {value}. Intervals hold with {confidence} confidence.").format(
+        verdict=word,
+        index=wording.index_name(study.quote),
+        value=wording.index(study.quoted),
+        confidence=f"{study.confidence * 100:g}\N{NO-BREAK SPACE}%",
     )
 
 

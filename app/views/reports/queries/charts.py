@@ -16,6 +16,15 @@ def chart(frame: Frame) -> Section | None:
     """The zone chart; nothing where there are no readings."""
     if not frame.window.count:
         return None
+    content, picture = zones(frame, *WIDE)
+    sentences = [_("Judged by the limits in force now; every band is equally tall, linear inside.")]
+    if content.blocks:
+        sentences.append(_("So many readings are drawn as blocks with their extremes; no extreme is left out."))
+    return Section("chart", _("Zone chart"), sentences=tuple(sentences), pictures=(picture,))
+
+
+def zones(frame: Frame, width: int, height: int) -> tuple[Chart, Picture]:
+    """The zone chart of the readings, so many pixels wide and high."""
     content = chart_of(frame.session, frame.current, frame.window)
     figure = zone_chart(
         content.points,
@@ -26,18 +35,14 @@ def chart(frame: Frame) -> Section | None:
         hands=content.hands,
         sizes=content.sizes,
         total_before=content.total_before,
-        width=WIDE[0],
+        width=width,
         ringed=None,
         left_out=content.left_out,
     )
     says = _("Zone chart of readings {first} to {last}: running average, corrections, tool changes, alarms.").format(
         first=frame.window.first, last=frame.window.last
     )
-    sentences = [_("Judged by the limits in force now; every band is equally tall, linear inside.")]
-    if content.blocks:
-        sentences.append(_("So many readings are drawn as blocks with their extremes; no extreme is left out."))
-    picture = Picture("zones", _("Zone chart"), says, figure, *WIDE, partial(_data, content))
-    return Section("chart", _("Zone chart"), sentences=tuple(sentences), pictures=(picture,))
+    return content, Picture("zones", _("Zone chart"), says, figure, width, height, partial(_data, content))
 
 
 def _data(content: Chart) -> Table:

@@ -17,6 +17,7 @@ from app.loop.summaries import queries as statistics
 from app.loop.summaries.queries import History, Numbers, Window
 from app.loop.tables.characteristics import ParametersVersion
 from app.loop.tables.readings import Reading
+from app.quality.capability.queries import Study, capability_of
 from app.views.reports.request import ReportRequest
 from app.web.fields import HISTORY_BEGINS
 
@@ -61,6 +62,11 @@ class Frame:
     @cached_property
     def numbers(self) -> Numbers:
         return statistics.numbers_of(self.session, self.current.characteristic, self.window)
+
+    @cached_property
+    def study(self) -> Study:
+        """The capability of the readings. Raises `Invalid` for more than ten million."""
+        return capability_of(self.session, self.current, self.window, sigma_by=self.request.sigma_by)
 
     @cached_property
     def history(self) -> History:

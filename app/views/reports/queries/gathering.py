@@ -16,11 +16,12 @@ from app.loop.characteristics.queries import CurrentCharacteristic
 from app.loop.characteristics.wording import choice
 from app.quality.proof import queries as proof
 from app.quality.proof import wording as proof_wording
-from app.views.reports.queries import capability, charts, control, loop, numbers, record
+from app.views.reports.queries import capability, charts, control, loop, numbers, record, summary
 from app.views.reports.queries.frame import Frame
 from app.views.reports.request import ReportRequest, SectionName
 
 GATHERED: dict[SectionName, Callable[[Frame], Section | None]] = {
+    SectionName.SUMMARY: summary.summary,
     SectionName.NUMBERS: numbers.numbers,
     SectionName.CAPABILITY: capability.capability,
     SectionName.CHART: charts.chart,
@@ -36,8 +37,10 @@ GATHERED: dict[SectionName, Callable[[Frame], Section | None]] = {
 }
 
 
-def report_of(session: Session, current: CurrentCharacteristic, request: ReportRequest, now: datetime) -> Report:
-    """Report on a characteristic and a period. `now`: the time of creation printed on it.
+def report_of(
+    session: Session, current: CurrentCharacteristic, request: ReportRequest, now: datetime, by: str = ""
+) -> Report:
+    """Report on a characteristic and a period. `now`, `by`: the time of creation printed on it, and who asked for it.
 
     A section that cannot be made – too many readings at once – says so in words; the others stand.
     """
@@ -55,6 +58,7 @@ def report_of(session: Session, current: CurrentCharacteristic, request: ReportR
         head=tuple(_head(frame)),
         sections=tuple(section for section in sections if section is not None),
         warnings=_proof(),
+        made_by=by,
     )
 
 
@@ -67,6 +71,7 @@ def _proof() -> tuple[str, ...]:
 def title_of(name: SectionName) -> str:
     """Title of a section."""
     return {
+        SectionName.SUMMARY: _("Summary"),
         SectionName.NUMBERS: _("Numbers"),
         SectionName.CAPABILITY: _("Capability"),
         SectionName.CHART: _("Zone chart"),
