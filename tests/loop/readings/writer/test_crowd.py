@@ -269,16 +269,15 @@ def gathering(server: Server, requests: int) -> Iterator[None]:
     """After what is sent within, wait until the server has read so many requests of new connections and sleeps."""
     before = {peer for peer, _unread in _connections(server)}
     yield
-    deadline, quiet = time.monotonic() + 60, 0
-    while quiet < 3:
-        assert time.monotonic() < deadline, "the requests did not gather"
+    deadline, awake = time.monotonic() + 60, _threads(server)
+    while awake:
         time.sleep(0.05)
         new = [unread for peer, unread in _connections(server) if peer not in before]
-        states = [stat.read_text().rpartition(")")[2].split()[0] for stat in _threads(server)]
+        assert time.monotonic() < deadline, f"the requests did not gather: unread {new}, at work {sorted(awake)}"
         if len(new) < requests or any(new):
-            quiet = 0
-        elif "R" not in states:  # on a busy computer, one thread or another waits for the processor half of the time
-            quiet += 1
+            awake = _threads(server)
+        else:  # each has been seen asleep since then: on a busy computer one or another always waits for the processor
+            awake = {thread for thread in awake & _threads(server) if _state(thread) == "R"}
 
 
 def _connections(server: Server) -> list[tuple[str, int]]:
@@ -288,8 +287,15 @@ def _connections(server: Server) -> list[tuple[str, int]]:
     return [(row[2], int(row[4].partition(":")[2], 16)) for row in rows if row[1].endswith(here) and row[3] == "01"]
 
 
-def _threads(server: Server) -> list[Path]:
-    return list(Path(f"/proc/{server.process.pid}/task").glob("*/stat"))
+def _threads(server: Server) -> set[Path]:
+    return set(Path(f"/proc/{server.process.pid}/task").glob("*/stat"))
+
+
+def _state(thread: Path) -> str:
+    try:
+        return thread.read_text().rpartition(")")[2].split()[0]
+    except OSError:  # it has ended
+        return "X"
 
 
 def _status(shop: Shop, reading: dict[str, Any]) -> int:
