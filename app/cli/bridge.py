@@ -22,8 +22,27 @@ if TYPE_CHECKING:
 bridge = typer.Typer(help="Connect machines that cannot speak REST.", invoke_without_command=True)
 cli.add_typer(bridge, name="bridge")
 
+
+def _named_before(context: typer.Context, config: Path) -> Path:
+    """The configuration of a command: that named behind it, else that named before it, as in ``inband bridge --config a.toml check``."""
+
+    def is_named(where: typer.Context) -> bool:
+        source = where.get_parameter_source("config")
+        return source is not None and source.name == "COMMANDLINE"
+
+    if context.parent is None or is_named(context) or not is_named(context.parent):
+        return config
+    return Path(context.parent.params["config"])
+
+
 ConfigFile = Annotated[
-    Path, typer.Option("--config", envvar="INBAND_BRIDGE_CONFIG", help="The configuration, a TOML file.")
+    Path,
+    typer.Option(
+        "--config",
+        envvar="INBAND_BRIDGE_CONFIG",
+        help="The configuration, a TOML file.",
+        callback=_named_before,
+    ),
 ]
 MachineName = Annotated[str, typer.Argument(help="The key of the machine, as in the configuration.")]
 PLANT = Path("plant.toml")

@@ -50,6 +50,25 @@ def test_the_quarantine_is_a_table_with_a_head(tmp_path: Path) -> None:
     assert len({line.index("\t") for line in said.stdout.splitlines()}) == 1, "aligned"
 
 
+@pytest.mark.parametrize(
+    ("words", "read"),
+    [
+        (["check"], "plant.toml"),
+        (["check", "--config", "a.toml"], "a.toml"),
+        (["--config", "a.toml", "check"], "a.toml"),
+        (["--config", "a.toml", "hold"], "a.toml"),
+        (["--config", "a.toml", "check", "--config", "b.toml"], "b.toml"),
+    ],
+)
+def test_a_configuration_may_be_named_before_or_behind_the_command(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, words: list[str], read: str
+) -> None:
+    """Named before it, it was passed over: the command worked with the machines of plant.toml."""
+    monkeypatch.chdir(tmp_path)
+    said = CliRunner().invoke(commands, words, env={"INBAND_BRIDGE_CONFIG": None})
+    assert f"{read} cannot be read" in str(said.exception)
+
+
 def test_what_is_refused_or_comes_again_is_logged(caplog: pytest.LogCaptureFixture) -> None:
     caplog.set_level(logging.INFO, "app.bridge")
     log_lines.readings("lathe-1", [GOOD, NO_JSON], 2)
