@@ -26,7 +26,7 @@ cli.add_typer(bridge, name="bridge")
 def _named_before(context: typer.Context, config: Path) -> Path:
     """The configuration of a command: that named behind it, else that named before it, as in ``inband bridge --config a.toml check``."""
 
-    def is_named(where: typer.Context) -> bool:
+    def is_named(where: Any) -> bool:
         source = where.get_parameter_source("config")
         return source is not None and source.name == "COMMANDLINE"
 
