@@ -1,8 +1,11 @@
 """Sinumerik: the subprograms `L05` and `L15` written out. `sinumerik.read` makes the same parameters of them."""
 
 from collections.abc import Iterator, Mapping
+from dataclasses import replace
 from typing import NamedTuple
 
+from app.core.decision.step import DECIMALS
+from app.core.natural import NaturalLimit
 from app.core.parameters import BY_R, FIELDS, TWO_POINT_SWITCH, Direction, FieldKind, Parameters, Variant
 from app.core.probing import direction_of
 from app.core.programs import unit_check
@@ -13,7 +16,8 @@ SECOND_BLOCK = ("R32", "R33", "R34", "R35", "R36", "R37", "R40", "R41", "R42")
 
 
 def write_measuring(parameters: Parameters, about: Mapping[str, str]) -> str:
-    """The measuring subprogram L15 of a characteristic; `read` makes the same parameters of it."""
+    """The measuring subprogram L15 of a characteristic; `read` makes the same parameters of it, as they are `drawn`."""
+    parameters = drawn(parameters)
     values = _r_values(parameters)
     written = {BY_R.get(r, r) for r in values} | ({"variant"} if TWO_POINT_SWITCH in values else set())
     extra = sorted(values.keys() - {*FIRST_BLOCK, *SECOND_BLOCK})
@@ -25,6 +29,16 @@ def write_measuring(parameters: Parameters, about: Mapping[str, str]) -> str:
         "M17",
     ]
     return _text("L15", "MEASURING SUBPROGRAM", [*describing(about), *settings(parameters, written)], blocks)
+
+
+def drawn(parameters: Parameters) -> Parameters:
+    """A natural limit said by nominal size and deviations: of R32 and R35 alone L93 would judge both sides, by R35/2."""
+    natural, width = parameters.natural_limit, parameters.tolerance_width
+    if natural is NaturalLimit.NONE or parameters.nominal is not None:
+        return parameters
+    upper, lower = (width, 0.0) if natural is NaturalLimit.LOWER else (0.0, -width)
+    target = round(parameters.target, DECIMALS)
+    return replace(parameters, target=target, nominal=target, upper_deviation=upper, lower_deviation=lower)
 
 
 def _r_values(parameters: Parameters) -> dict[str, float]:

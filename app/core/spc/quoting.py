@@ -108,8 +108,8 @@ def stable(control: Stability | Refused, time: InTime | Refused) -> bool | None:
     return control.in_control and (isinstance(time, Refused) or time.model.steady)
 
 
-def quoting_of(values: Floats, limits: Limits) -> Quoting:
-    """Decide by the readings alone: statistical control is judged by limits of their own.
+def quoting_of(values: Floats, limits: Limits, *, side: int = 0) -> Quoting:
+    """Decide by the readings alone: statistical control is judged by limits of their own. side: of a natural limit.
 
     >>> import numpy as np
     >>> quoting_of(np.repeat(0.001, 50), Limits(-1.0, 1.0, 0.0)).why
@@ -118,7 +118,7 @@ def quoting_of(values: Floats, limits: Limits) -> Quoting:
     result = or_refused(lambda: capability(values, limits))
     control, time = or_refused(lambda: stability.of_readings(values)), or_refused(lambda: in_time.in_time(values))
     by_percentile = or_refused(lambda: percentile(values, limits, minimum=ENOUGH_READINGS))
-    by_fit = fit_if_needed(values, limits, result)
+    by_fit = fit_if_needed(values, limits, result, side=side)
     return quoting(result, by_percentile, stable=stable(control, time), far=bool(far_off(values).any()), by_fit=by_fit)
 
 

@@ -54,6 +54,9 @@ NAMES: dict[str, tuple[str, ...]] = {
         "lowertol", "lower tol", "lower tolerance", "lower deviation", "unteres abmass", "untere toleranz",
         "donje odstupanje", "spodnje odstopanje", "нижнее отклонение", *LOWER_LIMITS,
     ),
+    "natural_limit": (
+        "natural limit", "naturliche grenze", "prirodna granica", "naravna meja", "природна граница", "естественная граница",
+    ),
     "key": ("key", "schlussel", "kljuc", "ключ", "кључ"),
     "correction_in_effect": ("correction in effect",),
     "touches": ("touches",),

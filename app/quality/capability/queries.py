@@ -242,7 +242,7 @@ def capability_of(
                 confidence,
                 lower=limits.lower is not None,
                 upper=limits.upper is not None,
-                normal=known is not None and Caution.NOT_NORMAL not in known.cautions,
+                normal=known is not None and Caution.NOT_NORMAL not in known.cautions and judged["by_fit"] is None,
             )
         ),
     )

@@ -101,13 +101,14 @@ class Simulation:
 
         None is of readings that are too coarse: a replay only shifts them, and shifted steps look finer than they are.
         """
-        tolerance = self.past.current.parameters.tolerance
+        parameters = self.past.current.parameters
+        tolerance, side = parameters.tolerance, parameters.natural_limit.side
         counted, mine = ~self.past.history.excluded, self.past.mine
         true = self.past.history["deviation"]
         if not self.past.resolved:
             return (UNRESOLVED,) * 3
         truly, today, other = (
-            quoting_of(deviations[self.past.inner(deviations) & counted], Limits(*tolerance, 0.0))
+            quoting_of(deviations[self.past.inner(deviations) & counted], Limits(*tolerance, 0.0), side=side)
             for deviations in (true, self.today_result.deviation[mine], self.other_result.deviation[mine])
         )
         return truly, today, other

@@ -10,7 +10,7 @@ from app.core.parameters import Parameters, read
 from app.core.probing import direction_of
 from app.core.programs import fanuc, sinumerik
 from app.core.programs.lines import LineVerdict, ProgramError, ProgramKind, ProgramText, written
-from app.core.programs.sinumerik_writing import Calibration, write_calibration, write_measuring
+from app.core.programs.sinumerik_writing import Calibration, drawn, write_calibration, write_measuring
 from app.loop.programs.wording import note
 from tests.chance import examples
 from tests.core.programs.conftest import parameter_sets
@@ -377,7 +377,7 @@ def test_a_characteristic_survives_its_program_text(parameters: Parameters, name
     assert found.program is not None
     assert found.program.about.get("name", "") == name
     again, _warnings = read(found.program.parameters)
-    assert again == parameters
+    assert again == drawn(parameters)
     assert write_measuring(again, found.program.about) == text
 
 
@@ -412,6 +412,21 @@ def test_a_natural_limit_is_said_where_it_would_not_be_read(changed: dict[str, o
         program = reader.read(text).program
         assert program is not None
         assert read(program.parameters)[0] == parameters
+
+
+def test_the_control_judges_a_natural_limit_without_a_drawing_on_its_one_side() -> None:
+    """R32 = 0 and R35 = 0.0127 alone would be 0 -/+ 0.00635 to L93: a run-out of 0.008 too large, though it is good."""
+    given = {"target": 0, "tolerance_width": 0.0127, "zero_range": 0, "wear_limit": 1, "confidence_limit": 1}
+    for natural, limits in (("lower", "R40=0.0127 R41=0 R42=0"), ("upper", "R40=0 R41=-0.0127 R42=0")):
+        parameters, _warnings = read(given | {"natural_limit": natural})
+        text = write_measuring(parameters, {})
+        assert limits in text
+        assert "L75" in text
+        assert "R32=" not in text
+        program = sinumerik.read(text).program
+        assert program is not None
+        again = read(program.parameters)[0]
+        assert (again.target, again.tolerance_width, again.natural_limit) == (0, 0.0127, natural)
 
 
 @examples(50)

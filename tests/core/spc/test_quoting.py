@@ -9,7 +9,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from app.core.spc.capability import Caution, Limits, capability, percentile
-from app.core.spc.quoting import FORBID_CPK, Quote, Quoting, quoting
+from app.core.spc.distributions import Family
+from app.core.spc.fitting import fitted
+from app.core.spc.quoting import FORBID_CPK, Quote, Quoting, quoting, quoting_of
 from app.core.spc.refusal import Reason, Refused
 from app.core.spc.resolution import resolution_of
 
@@ -105,3 +107,13 @@ def test_the_quote_never_contradicts_a_caution(
         assert quote.preliminary == bool(by_percentile.cautions or Caution.FEW_READINGS in found.cautions)
     assert not (far and quote.quote is not Quote.NONE)
     assert Caution.FEW_READINGS not in found.cautions or quote.preliminary or quote.quote is Quote.NONE
+
+
+def test_at_a_natural_limit_what_if_quotes_the_distribution_that_begins_there() -> None:
+    """As the capability page does: of 300 half-normal readings the normal one would be judged beside zero."""
+    values = np.abs(np.random.default_rng(12).normal(0, 0.002, 300))
+    limits = Limits(None, 0.0127, 0.0)
+    quoted = quoting_of(values, limits, side=-1)
+    fit = fitted(values, limits, side=-1)
+    assert (quoted.quote, quoted.value) == (Quote.FITTED, fit.ppk.value)
+    assert fit.fit.family is Family.HALF_NORMAL

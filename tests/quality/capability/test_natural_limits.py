@@ -50,6 +50,7 @@ def test_run_out_is_judged_by_its_upper_limit_alone(shop: Shop, viewer: Person, 
     assert (found["cp"], found["pp"], found["cpm"], found["percentiles"]["pp"]) == (None, None, None, None)
     assert [found[name]["below"] for name in ("ppm_within", "ppm_overall", "ppm_observed")] == [None, None, None]
     assert found["ppm_observed"]["total"] == 0
+    assert found["tolerance_interval"] is None, "it is not normal, and 300 are too few for one by the extremes"
     assert found["one_sided"].startswith("The lower limit 0 mm is a natural one: no part can be below it.")
     assert study(shop, run_out, "last=all&side=upper") == found
     assert "carries no index" in study(shop, run_out, "side=lower", 422)["detail"]

@@ -32,13 +32,24 @@ def missing(layout: Layout, chosen: Collection[int]) -> tuple[list[Content], lis
 def _content(place: int, name: str, drawn: Drawn, layout: Layout) -> Content:
     try:
         nominal, lower, upper = _limits(drawn, layout)
+        natural = _natural(drawn, layout)
     except _Wrong as error:
         return Content(place, "", "", "", name, "mm", not_new=str(error))
-    natural = None
-    if lower is None and upper is not None and not nominal:
+    if lower is None and upper is not None and not nominal and natural in (None, NaturalLimit.LOWER):
         nominal, lower, natural = 0.0, 0.0, NaturalLimit.LOWER  # a form error
     reason = not_new(nominal, lower, upper, (_("the lower limit"), _("the upper limit")))
     return Content(place, "", "", "", name, "mm", nominal, lower, upper, not_new=reason, natural_limit=natural)
+
+
+def _natural(drawn: Drawn, layout: Layout) -> NaturalLimit | None:
+    """The natural limit that its rows name; None where they say nothing. Raises `_Wrong`."""
+    said = folded(drawn.natural_limit)
+    if not said:
+        return None
+    if said not in set(NaturalLimit):
+        words = _("{column} {said!r} is not lower, upper or none")
+        raise _Wrong(words.format(column=layout.named("natural_limit"), said=drawn.natural_limit[:40]))
+    return NaturalLimit(said)
 
 
 def _limits(drawn: Drawn, layout: Layout) -> tuple[float | None, float | None, float | None]:

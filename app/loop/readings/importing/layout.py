@@ -26,7 +26,7 @@ LONGEST_NAME = 1_000
 ORIGIN = COLUMNS[:2]
 """Fields that are no choice of a person: they are there in what Inband wrote."""
 NO_DIGIT = "*"
-DRAWN = ("nominal", "upper", "lower")
+DRAWN = ("nominal", "upper", "lower", "natural_limit")
 """Fields of a characteristic, not of its readings: they set it up where it is missing."""
 MOST_NAMES = 1_000
 DATES = {"date", "datum", "дата", "датум"}
@@ -57,6 +57,7 @@ class Drawn(NamedTuple):
     nominal: str
     upper: str
     lower: str
+    natural_limit: str
     unit: str
     other: int = 0
 
@@ -304,12 +305,12 @@ def _drawn(layout: Layout, rows: Iterable[tuple[int, Sequence[Any]]]) -> dict[st
             continue
         if len(name) > LONGEST_NAME:
             raise wrong(f"{layout.named('characteristic')}, {_('line {line}').format(line=line)}", _long_name(name))
-        nominal, upper, lower, unit = (
+        nominal, upper, lower, natural, unit = (
             " ".join(_written(cells[at]) for at in layout.columns.get(each, ())) for each in (*DRAWN, "unit")
         )
-        drawn = Drawn(line, nominal, upper, lower, unit)
+        drawn = Drawn(line, nominal, upper, lower, natural, unit)
         first = found.setdefault(name, drawn)
-        if not first.other and first[1:5] != drawn[1:5]:
+        if not first.other and first[1:6] != drawn[1:6]:
             found[name] = first._replace(other=line)
         if len(found) > MOST_NAMES:
             column = layout.named("characteristic")

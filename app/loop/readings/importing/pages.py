@@ -305,6 +305,7 @@ def _fields(layout: Layout, *, wide: bool = False) -> list[dict[str, Any]]:
         "nominal": _("Nominal size"),
         "upper": _("Upper limit"),
         "lower": _("Lower limit"),
+        "natural_limit": _("Natural limit"),
         "key": _("Key"),
     }
     columns = [(str(at), name or _("Column {n}").format(n=at)) for at, name in enumerate(layout.header, start=1)]

@@ -24,6 +24,7 @@ from app.bridge import file_content
 from app.bridge.configuration import configuration_from
 from app.bridge.file_content import read_content
 from app.cli import data
+from app.core.parameters import read
 from app.errors import InbandError
 from app.files.formats.aqdef_values import OF_CHARACTERISTIC as C
 from app.files.formats.aqdef_values import OF_FIELD as F
@@ -32,6 +33,7 @@ from app.loop.readings.importing import drawn, uploads
 from app.loop.readings.importing import lines as importing
 from app.loop.readings.importing.aqdef import actions as aqdef_actions
 from app.loop.readings.importing.aqdef import content as aqdef_content
+from app.loop.readings.importing.aqdef.matching import parameters_of
 from app.loop.readings.importing.layout import Wishes, look
 from tests.conftest import NewDatabase, drop_database
 from tests.in_process import InProcess, in_process
@@ -456,6 +458,26 @@ def test_the_limits_of_a_row(tmp_path: Path, head: str, row: str, found: tuple[f
     else:
         assert content.not_new == ""
         assert (content.nominal, content.lower, content.upper) == pytest.approx(found)
+
+
+@pytest.mark.parametrize(
+    ("cells", "found"),
+    [
+        ("0;0.01;0;lower", "lower"),
+        ("0;0.01;0;none", "none"),  # a position: sizes below 0 exist
+        ("0;0.01;0;", "lower"),  # as it is assumed of every set
+        ("16;0.01;-0.02;Upper", "upper"),
+        ("0;0.01;0;left", "Natural limit 'left' is not lower, upper or none"),
+    ],
+)
+def test_a_row_names_its_natural_limit(tmp_path: Path, cells: str, found: str) -> None:
+    path = tmp_path / "a.csv"
+    path.write_text(f"Feature;Meas;Nominal;Upper Tol;Lower Tol;Natural limit\nA;0.004;{cells}\n")
+    [content] = drawn.contents(look(path, Wishes()))
+    if content.not_new:
+        assert found in content.not_new
+    else:
+        assert read(parameters_of(content))[0].natural_limit.value == found
 
 
 OBJECTS = [
