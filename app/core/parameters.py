@@ -212,6 +212,21 @@ def default_averaging_limit(tolerance_width: float, natural_limit: str | None = 
     return round(half_width(tolerance_width, natural_limit) * 2 / 3, 9)
 
 
+def cautious(tolerance_width: float, natural_limit: str | None = None) -> dict[str, Any]:
+    """Zones of a characteristic that corrects nothing and of which the drawing alone is known, mm.
+
+    >>> cautious(0.012, "lower")
+    {'zero_range': 0.002, 'wear_limit': 0.3, 'confidence_limit': 1.0, 'mode': 'measure_only'}
+    """
+    wear = max(0.3, tolerance_width)
+    return {
+        "zero_range": round(default_averaging_limit(tolerance_width, natural_limit) / 4, 9),
+        "wear_limit": wear,
+        "confidence_limit": max(1.0, 2 * wear),
+        "mode": "measure_only",
+    }
+
+
 def read(given: Mapping[str, Any]) -> tuple[Parameters, list[Problem]]:
     """Make parameters of what was sent, under names or R numbers; R42 may be a fit, `40 h6`. Return them with the warnings.
 

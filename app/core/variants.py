@@ -5,7 +5,8 @@ one point, indexed  run-out = half-difference of the sides (of more than two, ha
 several points      out-of-roundness = range of the points' means
 round the part
 several points      taper = slope of the least-squares line through the points' means, per mm
-along the part      of length (R26 between points) and over the whole length
+along the part      of length (R26 between points) and over the whole length; straightness = range
+                    of the means about that line, of three points and more
 two points          nothing beside the distance, which is the value
 ==================  =========================================================================
 
@@ -14,6 +15,7 @@ deviation ``s = sqrt(sum of squares about each point's mean / sum of (repeats - 
 """
 
 from collections.abc import Sequence
+from enum import StrEnum
 from math import fsum, sqrt
 from typing import NamedTuple
 
@@ -23,14 +25,24 @@ from app.core.parameters import Parameters, Variant
 from app.core.probing import Touches, points_expected, sections_of
 
 POINTS_FOR_A_SHAPE = 2
+POINTS_FOR_STRAIGHTNESS = 3
+
+
+class FormResult(StrEnum):
+    """A result that is form, of which a characteristic may keep statistics of its own."""
+
+    RUN_OUT = "run_out"
+    OUT_OF_ROUNDNESS = "out_of_roundness"
+    TAPER = "taper"
+    STRAIGHTNESS = "straightness"
 
 
 class Results(NamedTuple):
     """The variant's own results; None where the variant has no such thing.
 
-    run_out, out_of_roundness: mm, never negative. taper: how much larger the end is than the beginning, mm over the
-    length; slope: the same in mm per mm, None where the spacing R26 is not said. repeat_range, repeat_deviation: of the
-    repeats, mm. sections_outside: sections out of tolerance; rejected: too many of them. Both only with n of m.
+    run_out, out_of_roundness, straightness: mm, never negative. taper: how much larger the end is than the beginning, mm
+    over the length; slope: the same in mm per mm, None where the spacing R26 is not said. repeat_range, repeat_deviation:
+    of the repeats, mm. sections_outside: sections out of tolerance; rejected: too many of them. Both only with n of m.
     """
 
     run_out: float | None = None
@@ -41,6 +53,33 @@ class Results(NamedTuple):
     repeat_deviation: float | None = None
     sections_outside: int | None = None
     rejected: bool | None = None
+    straightness: float | None = None
+
+    def form(self, form: FormResult) -> float | None:
+        """A form deviation as it is judged: its size, never negative, mm; None where the reading has none.
+
+        >>> Results(taper=-0.004).form(FormResult.TAPER), Results(taper=-0.004).form(FormResult.RUN_OUT)
+        (0.004, None)
+        """
+        value: float | None = getattr(self, form.value)
+        return None if value is None else abs(value)
+
+
+def forms_of(parameters: Parameters) -> tuple[FormResult, ...]:
+    """The form deviations that readings with these parameters have beside the value.
+
+    >>> from app.core.parameters import read
+    >>> base = {"R32": 62.0, "R35": 0.03, "R33": 0, "R37": 0.3, "R36": 1.0}
+    >>> [form.value for form in forms_of(read(base | {"R25": 3, "R23": 3, "R26": 10})[0])], forms_of(read(base)[0])
+    (['taper', 'straightness'], ())
+    """
+    points = points_expected(parameters)
+    own = {
+        Variant.INDEXED: (FormResult.RUN_OUT,),
+        Variant.ROUND: (FormResult.OUT_OF_ROUNDNESS,),
+        Variant.ALONG: (FormResult.TAPER, *((FormResult.STRAIGHTNESS,) if points >= POINTS_FOR_STRAIGHTNESS else ())),
+    }.get(parameters.variant, ())
+    return own if points >= POINTS_FOR_A_SHAPE else ()
 
 
 def yielded_by(parameters: Parameters) -> tuple[str, ...]:
@@ -50,10 +89,7 @@ def yielded_by(parameters: Parameters) -> tuple[str, ...]:
     >>> yielded_by(read({"R32": 62.0, "R35": 0.03, "R33": 0, "R37": 0.3, "R36": 1.0, "R25": 1, "R27": 2})[0])
     ('run_out', 'repeat_range', 'repeat_deviation')
     """
-    own = {Variant.INDEXED: "run_out", Variant.ROUND: "out_of_roundness", Variant.ALONG: "taper"}.get(
-        parameters.variant
-    )
-    shape = (own,) if own and points_expected(parameters) >= POINTS_FOR_A_SHAPE else ()
+    shape = (form.value for form in forms_of(parameters))
     return (*shape, *(("repeat_range", "repeat_deviation") if parameters.repeats > 1 else ()))
 
 
@@ -67,10 +103,10 @@ def results_of(
     >>> from app.core.parameters import read
     >>> bore = {"R32": 62.0, "R35": 0.03, "R33": 0, "R37": 0.3, "R36": 1.0, "R25": 3, "R23": 3, "R26": 10}
     >>> found = results_of(read(bore)[0], [[62.0], [62.002], [62.004]], [62.0, 62.002, 62.004])
-    >>> found.taper, found.slope
-    (0.004, 0.0002)
+    >>> found.taper, found.slope, found.straightness
+    (0.004, 0.0002, 0.0)
     """
-    run_out = out_of_roundness = taper = slope = repeat_range = repeat_deviation = None
+    run_out = out_of_roundness = taper = slope = straightness = repeat_range = repeat_deviation = None
     if len(points) >= POINTS_FOR_A_SHAPE:
         spread = round(max(points) - min(points), DECIMALS)
         if parameters.variant is Variant.INDEXED:
@@ -81,6 +117,7 @@ def results_of(
             step = fitted_step(points)
             taper = rounded(step * (len(points) - 1))
             slope = rounded(step / parameters.index) if parameters.index else None
+            straightness = _straightness(points) if len(points) >= POINTS_FOR_STRAIGHTNESS else None
     if parameters.repeats > 1:
         repeats = [[touch for touch in point or () if touch is not None] for point in touches]
         repeat_range = round(max(max(point) - min(point) for point in repeats), DECIMALS)
@@ -92,7 +129,8 @@ def results_of(
         rejected = len(sections) - outside < parameters.accept_n
     if run_out is out_of_roundness is taper is repeat_range is outside is None:
         return None
-    return Results(run_out, out_of_roundness, taper, slope, repeat_range, repeat_deviation, outside, rejected)
+    repeats_of = (repeat_range, repeat_deviation)
+    return Results(run_out, out_of_roundness, taper, slope, *repeats_of, outside, rejected, straightness)
 
 
 def fitted_step(points: Sequence[float]) -> float:
@@ -117,6 +155,12 @@ def fitted_points(points: Sequence[float]) -> list[float]:
     """
     middle, mean, step = (len(points) - 1) / 2, fsum(points) / len(points), fitted_step(points)
     return [mean + (at - middle) * step for at in range(len(points))]
+
+
+def _straightness(points: Sequence[float]) -> float:
+    """Range of evenly spaced points about their least-squares line, mm (ISO 12780, LS reference)."""
+    beside = [point - fitted for point, fitted in zip(points, fitted_points(points), strict=True)]
+    return abs(rounded(max(beside) - min(beside)))
 
 
 def _pooled_deviation(touches: Sequence[Sequence[float]]) -> float:

@@ -38,7 +38,7 @@ def test_the_range_round_the_part_indicates_out_of_roundness(shaft: Made) -> Non
 def test_the_slope_along_the_part_is_taper(shaft: Made) -> None:
     """By hand: y - mean = -3, 0, -1, 4 µm; i - mean = -1.5, -0.5, 0.5, 1.5; sum = 10 / 5 = 2 µm from point to point."""
     found = results(shaft(variant="along", points=4, index=12.5), [[39.997], [40.0], [39.999], [40.004]])
-    assert found == Results(taper=0.006, slope=0.00016)
+    assert found == Results(taper=0.006, slope=0.00016, straightness=0.003)  # beside the line: 0, 1, -2 and 1 µm: 3 µm
     assert fitted_points([39.997, 40.0, 39.999, 40.004]) == pytest.approx([39.997, 39.999, 40.001, 40.003])
 
 

@@ -51,6 +51,8 @@ ADDED: dict[str, dict[str, Any]] = {
     "api_key": {"last_used_at": None},
     "correction": {"mapping": None},
     "baseline": {"shifts": None},
+    "characteristic": {"form_of": None, "form": None},
+    "reading_results": {"straightness": None},
     "report_job": {"person_id": None, "key_id": None},
     "outlook": dict.fromkeys(("record_of", "lives", "tested", "held", "widening")),
 }

@@ -37,6 +37,7 @@ PARTS = {  # only ever fetched into a page
     "/plant-summary",
     "/todo/count",
     "/setup/fit",
+    "/setup/natural",
     "/station/{machine}/events",
     "/characteristics/{characteristic}/readings/{sequence}/panel",
 }
@@ -47,7 +48,6 @@ BESIDE_THE_MACHINE = {
     "/station/{machine}",
     "/station/{machine}/alarms/{alarm}?action=measured_by_hand",
     "/station/{machine}/tools/3/change",
-    "/station/{machine}/sizes",
     "/alarms",
     "/alarms/{alarm}",
     "/alarms/{alarm}?action=keep_cutting",

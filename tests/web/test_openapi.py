@@ -403,6 +403,7 @@ FORMS: dict[str, tuple[str, ...] | None] = {
     "/reports/{number}/throw-away": ("throw_reports_away",),
     "/setup/characteristics/new": ("add_characteristic",),
     "/setup/characteristics/{characteristic}": ("change_characteristic",),
+    "/setup/characteristics/{characteristic}/forms": ("add_characteristic",),
     "/setup/machines/new": ("add_machine",),
     "/setup/machines/{machine}": ("change_machine",),
     "/setup/machines/{machine}/keys": ("make_machine_key",),
@@ -424,9 +425,7 @@ FORMS: dict[str, tuple[str, ...] | None] = {
     "/station/{machine}/alarms/{number}": None,  # on a device it is asked who acts: tests/views/station
     "/station/{machine}/corrections/{number}": None,
     "/station/{machine}/note": None,
-    "/station/{machine}/sizes": None,
     "/station/{machine}/tools/{number}/change": None,
-    "/station/{machine}/tools/{number}/corrections": None,
     "/sign-out": None,
     "/signals/{number}": ("comment_signal",),
     "/work-zeros/fixtures/{machine}/{fixture}": ("watch_fixture",),

@@ -25,7 +25,8 @@ from app.core.parameters import (
 from app.db.events import publish
 from app.errors import Conflict, FieldError, Invalid
 from app.language.i18n import _
-from app.loop.characteristics import queries, wording
+from app.loop.characteristics import form_actions, queries, wording
+from app.loop.characteristics.form_actions import parameters_of_form, refused_for_form
 from app.loop.characteristics.queries import CurrentCharacteristic
 from app.loop.characteristics.schemas import CharacteristicChange, CharacteristicIn, warnings_of
 from app.loop.machines import queries as machines
@@ -65,10 +66,14 @@ def add_characteristic(session: Session, given: CharacteristicIn, actor: str) ->
             _("Choose another key, or change the characteristic that is there."),
             errors=[FieldError("key", _("is taken"))],
         )
-    parameters = _read(given.parameters, machine)
-    if errors := contested(session, machine, given.key, parameters):
+    source = form_actions.source_of(session, machine, given.form_of) if given.form_of is not None else None
+    parameters = _read(given.parameters if source is None else parameters_of_form(given.parameters), machine)
+    errors = contested(session, machine, given.key, parameters)
+    if errors or (source is not None and (errors := refused_for_form(parameters))):
         raise _refused(errors)
     new = Characteristic(machine_id=machine.id, key=given.key, name=given.name, part=given.part, unit=given.unit)
+    if source is not None and given.form_of is not None:
+        new.form_of, new.form = source.id, given.form_of.result.value
     session.add(new)
     session.flush()
     version = _new_version(new, 1, parameters, actor, None)
@@ -86,7 +91,8 @@ def add_characteristic(session: Session, given: CharacteristicIn, actor: str) ->
     after = given.model_dump(exclude={"parameters"}) | {"parameters": parameters.as_dict()}
     record(session, actor, "characteristic added", f"characteristic/{new.key}", None, after)
     publish(session, {"kind": "characteristic", "machine": machine.key, "characteristic": new.key})
-    return CurrentCharacteristic(new, machine, version, queries.mapped(session, machine))
+    mapped = queries.mapped(session, machine)
+    return CurrentCharacteristic(new, machine, version, mapped, None if source is None else source.key)
 
 
 def change_characteristic(
@@ -239,7 +245,7 @@ def _change_parameters(
     session: Session, current: CurrentCharacteristic, given: Mapping[str, Any], reason: str | None, actor: str
 ) -> tuple[CurrentCharacteristic, list[dict[str, Any]]]:
     """Under the machine's lock. Returns the state now, and what to tell everybody."""
-    characteristic, machine, version, mapped = current
+    characteristic, machine, version, _mapped, _source = current
     changed = merged(version.parameters, given)
     errors = refusals(changed, machine)
     old, new = current.parameters, None if errors else read(changed)[0]
@@ -247,6 +253,7 @@ def _change_parameters(
         return current, []
     if new is not None:
         errors += contested(session, machine, characteristic.key, new)
+        errors += [] if characteristic.form is None else refused_for_form(new)
     if not reason:
         wrong = _("is required when parameters change: say why, for those who read it in a year")
         errors.append(FieldError("reason", wrong))
@@ -275,7 +282,7 @@ def _change_parameters(
     )
     if other_tool:
         _keep_parts(session, machine.id, old.tool_memory, parts)
-    now = CurrentCharacteristic(characteristic, machine, new_version, mapped)
+    now = current._replace(version=new_version)
     changes = [_changed(now)]
     if (other_tool or nanometres(new.target) != nanometres(old.target)) and new.average_memory:
         _restart_average(session, machine.id, new.average_memory)

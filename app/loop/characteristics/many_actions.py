@@ -123,9 +123,11 @@ def copy_machine(session: Session, source: Machine, given: MachineIn, keys: Mapp
             for current in queries.characteristics(session, machine_id=source.id, limit=100_000)
         }
         wrong = [_("{key} is not on {machine}").format(key=key, machine=source.key) for key in keys if key not in there]
-        for key, new_key in keys.items():
-            if key in there:
-                wrong += _copy(session, there[key], new_key, created, actor)
+        for key, new_key in sorted(
+            keys.items(), key=lambda pair: pair[0] in there and there[pair[0]].source is not None
+        ):
+            if key in there:  # what is probed before its form
+                wrong += _copy(session, there[key], new_key, created, actor, keys.get(there[key].source or ""))
         if wrong:
             raise Invalid(
                 _("The machine was not copied."), errors=[FieldError("characteristics", each) for each in wrong]
@@ -133,10 +135,14 @@ def copy_machine(session: Session, source: Machine, given: MachineIn, keys: Mapp
     return created
 
 
-def _copy(session: Session, current: CurrentCharacteristic, key: str, machine: Machine, actor: str) -> list[str]:
-    """Set up a characteristic like this one on another machine; the errors, if it cannot be."""
+def _copy(
+    session: Session, current: CurrentCharacteristic, key: str, machine: Machine, actor: str, source: str | None
+) -> list[str]:
+    """Set up a characteristic like this one on another machine; the errors, if it cannot be. source: as whose form."""
     like = current.characteristic
-    wanted = {"key": key, "name": like.name, "part": like.part, "machine": machine.key}
+    wanted: dict[str, Any] = {"key": key, "name": like.name, "part": like.part, "machine": machine.key}
+    if source is not None:
+        wanted["form_of"] = {"characteristic": source, "result": like.form}
     try:
         actions.add_characteristic(
             session, parsed(CharacteristicIn, wanted | {"parameters": _as_given(current)}), actor

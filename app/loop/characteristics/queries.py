@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
 from sqlalchemy import ColumnElement, Float, Integer, func, select
-from sqlalchemy.orm import Session
+from sqlalchemy.orm import Session, aliased
 
 from app.access.callers import Caller, Role
 from app.core.parameters import Parameters
@@ -21,12 +21,16 @@ from app.web.fields import is_slug
 
 
 class CurrentCharacteristic(NamedTuple):
-    """A characteristic as it is now. mapped: what the machine's bridge may write to; None without a bridge."""
+    """A characteristic as it is now. mapped: what the machine's bridge may write to; None without a bridge.
+
+    source: the key of the characteristic whose form it is; None for all others.
+    """
 
     characteristic: Characteristic
     machine: Machine
     version: ParametersVersion
     mapped: Sequence[Mapping[str, Any]] | None = None
+    source: str | None = None
 
     @property
     def parameters(self) -> Parameters:
@@ -41,9 +45,11 @@ class CurrentCharacteristic(NamedTuple):
         return all(location["tool_memory"] != parameters.tool_memory for location in self.mapped)
 
 
+_Source = aliased(Characteristic)
 _CURRENT = (
-    select(Characteristic, Machine, ParametersVersion, Connection.locations)
+    select(Characteristic, Machine, ParametersVersion, Connection.locations, _Source.key)
     .join(Machine, Machine.id == Characteristic.machine_id)
+    .outerjoin(_Source, (_Source.machine_id == Characteristic.machine_id) & (_Source.id == Characteristic.form_of))
     .outerjoin(Connection, Connection.machine_id == Machine.id)
     .join(Stream, (Stream.machine_id == Characteristic.machine_id) & (Stream.characteristic_id == Characteristic.id))
     .join(
@@ -57,13 +63,27 @@ _CURRENT = (
 
 def characteristic_named(session: Session, key: str) -> CurrentCharacteristic:
     """The characteristic with this key. Raises `NotFound`."""
-    row = session.execute(_CURRENT.where(Characteristic.key == key)).one_or_none() if is_slug(key) else None
-    if row is None:
+    current = found(session, key)
+    if current is None:
         raise NotFound(
             _("There is no characteristic {key}.").format(key=repr(key[:64])),
             _("Check the key; GET /api/v1/characteristics lists them."),
         )
-    return CurrentCharacteristic(*row)
+    return current
+
+
+def found(session: Session, key: str) -> CurrentCharacteristic | None:
+    """The characteristic with this key, if there is one."""
+    row = session.execute(_CURRENT.where(Characteristic.key == key)).one_or_none() if is_slug(key) else None
+    return None if row is None else CurrentCharacteristic(*row)
+
+
+def forms(session: Session, characteristic: Characteristic) -> list[CurrentCharacteristic]:
+    """The characteristics whose readings are results of this one's, in the order they were set up."""
+    of_it = _CURRENT.where(
+        Characteristic.machine_id == characteristic.machine_id, Characteristic.form_of == characteristic.id
+    )
+    return [CurrentCharacteristic(*row) for row in session.execute(of_it.order_by(Characteristic.id))]
 
 
 def hold_characteristic(session: Session, given: Mapping[str, Any]) -> None:

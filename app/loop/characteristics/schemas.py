@@ -20,6 +20,7 @@ from app.core.parameters import (
     unusual_switch,
 )
 from app.core.plausibility import inch_warnings
+from app.core.variants import FormResult
 from app.loop.characteristics import queries, wording
 from app.loop.tables.characteristics import ParametersVersion
 from app.loop.warnings.wording import sentence
@@ -92,6 +93,21 @@ GivenParameters = Annotated[
 Part = Annotated[Text200, Field(description="The part it belongs to: drawing or article number.")]
 
 
+class FormOf(Body):
+    """A result of another characteristic's readings that this one is made of."""
+
+    characteristic: Annotated[
+        Slug, Field(description="The key of the characteristic that is probed, on the same machine.")
+    ]
+    result: Annotated[
+        FormResult,
+        Field(
+            description="Which result of its readings: run_out (part indexed, R25 = 1), out_of_roundness (points round, R25 = 2), "
+            "taper or straightness (points along, R25 = 3); taper without its sign."
+        ),
+    ]
+
+
 class CharacteristicIn(Body):
     """A characteristic to set up."""
 
@@ -102,6 +118,15 @@ class CharacteristicIn(Body):
     ]
     part: Part | None = None
     unit: Annotated[Literal["mm"], Field(description="Of its lengths.")] = "mm"
+    form_of: Annotated[
+        FormOf | None,
+        Field(
+            description="Set up the form of another characteristic: each of its readings that has the result brings one here, in "
+            "the same transaction and with the same key. Of `parameters` the limit is enough (`upper_deviation`, R40): 0 is the "
+            "natural limit, nothing is corrected. Cannot be changed later.",
+            examples=[{"characteristic": "flange-d62", "result": "out_of_roundness"}],
+        ),
+    ] = None
     parameters: GivenParameters
 
 
@@ -134,6 +159,9 @@ class CharacteristicOut(BaseModel):
             description="The R parameters by name, computed ones included; lengths in mm.",
             json_schema_extra=parameters_schema(),
         ),
+    ]
+    form_of: Annotated[
+        FormOf | None, Field(description="Of a characteristic of form: what its readings are results of; else null.")
     ]
     parameters_version: Annotated[
         int, Field(description="Counts 1, 2, 3 …; readings keep the one they were judged by.")
@@ -184,7 +212,7 @@ def characteristic_out(
     current: queries.CurrentCharacteristic, before: float | None = None, given: Mapping[str, Any] | None = None
 ) -> CharacteristicOut:
     """Return a characteristic as it is answered. before, given: as `warnings_of` has them."""
-    characteristic, machine, version, _mapped = current
+    characteristic, machine, version, _mapped, source = current
     return CharacteristicOut(
         key=characteristic.key,
         name=characteristic.name,
@@ -192,6 +220,9 @@ def characteristic_out(
         part=characteristic.part,
         unit=characteristic.unit,
         parameters=wording.in_order(version.parameters),
+        form_of=None
+        if source is None or characteristic.form is None
+        else FormOf(characteristic=source, result=FormResult(characteristic.form)),
         parameters_version=version.version,
         created_at=characteristic.created_at,
         warnings=warnings_of(current, before, given),

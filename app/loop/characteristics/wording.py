@@ -100,6 +100,7 @@ def result_label(name: str) -> str:
         "out_of_roundness": _("Out-of-roundness"),
         "taper": _("Taper over the length"),
         "slope": _("Taper per mm"),
+        "straightness": _("Straightness along"),
         "repeat_range": _("Range of the repeats"),
         "repeat_deviation": _("Standard deviation of the repeats"),
         "sections_outside": _("Sections outside"),

@@ -147,8 +147,15 @@ def program_of(
 ) -> str:
     """The measuring program of a characteristic, or the calibration for its axis, direction and memory location.
 
-    gauge: size of the gauge or ring, R32 or #505, mm; without it the target is there, and the text says so.
+    gauge: size of the gauge or ring, R32 or #505, mm; without it the target is there, and the text says so. Raises `Invalid` for
+    form, which is not probed by itself.
     """
+    if current.source is not None:
+        raise Invalid.at(
+            "characteristic",
+            _("is form: its readings come with those of {key}, whose program it is").format(key=current.source),
+            do=_("Ask for the program of that one."),
+        )
     characteristic, parameters = current.characteristic, current.parameters
     about = {"characteristic": characteristic.key, "name": characteristic.name, "part": characteristic.part or ""}
     if kind == "measuring":
@@ -176,9 +183,9 @@ class ProgramView(NamedTuple):
 
 
 def program_view(current: CurrentCharacteristic) -> ProgramView | None:
-    """The measuring program for the machine's own control; None where nothing is written for it."""
+    """The measuring program for the machine's own control; None where nothing is written for it, and for form."""
     control = current.machine.control
-    if control not in WRITTEN:
+    if control not in WRITTEN or current.source is not None:
         return None
     download = f"/api/v1/characteristics/{current.characteristic.key}/program"
     return ProgramView(program_of(current, control), download, file_name(current, control, "measuring"))

@@ -107,6 +107,9 @@ class VariantResults(BaseModel):
         float | None, Field(description="Points along (R25 = 3): rise of the least-squares line over the length.")
     ]
     slope: Annotated[float | None, Field(description="The same per mm; null where the spacing R26 is not said.")]
+    straightness: Annotated[
+        float | None, Field(description="Points along, three and more: their range about that line.")
+    ]
     repeat_range: Annotated[float | None, Field(description="Largest range of the repeats (R27) at one point.")]
     repeat_deviation: Annotated[float | None, Field(description="Pooled standard deviation of the repeats.")]
     sections_outside: Annotated[int | None, Field(description="With acceptance n of m: sections out of tolerance.")]
@@ -180,10 +183,6 @@ class ReadingContextOut(BaseModel):
     operator: Annotated[str | None, Field(description="Who measured.")] = None
     machine: Annotated[str | None, Field(description="The machine that made the part, as the sender calls it.")] = None
     gauge: Annotated[str | None, Field(description="What it was measured with.")] = None
-    by_hand: Annotated[
-        bool | None,
-        Field(description="true: a person measured it with a gauge; the empirical value (R11) is not taken off."),
-    ] = None
     comment: Annotated[str | None, Field(description="Remark.")] = None
     events: Annotated[list[str] | None, Field(description="What happened at the part or before it.")] = None
     process: Annotated[dict[str, float] | None, Field(description="Process parameters by name.")] = None

@@ -182,6 +182,7 @@ class ReadingResults(Base):
     repeat_deviation: Mapped[float | None]
     sections_outside: Mapped[int | None] = mapped_column(SmallInteger)
     rejected: Mapped[bool | None]
+    straightness: Mapped[float | None]
 
 
 class HandMeasurement(Base):

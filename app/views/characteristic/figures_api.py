@@ -21,7 +21,7 @@ from app.web.fields import LARGEST_ID
 
 router = api_router("characteristics", FROM_REPLICA)
 
-ResultName = Literal["run_out", "out_of_roundness", "taper", "repeat_range", "repeat_deviation"]
+ResultName = Literal["run_out", "out_of_roundness", "taper", "straightness", "repeat_range", "repeat_deviation"]
 
 
 def _found(

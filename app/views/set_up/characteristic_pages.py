@@ -11,13 +11,14 @@ from starlette.responses import RedirectResponse
 
 from app.access.deps import Caller, Engineer, Viewer, require
 from app.core.fits import fit_of
-from app.core.parameters import AVERAGE_LOCATIONS, BY_NAME
+from app.core.natural import looks_natural
+from app.core.parameters import BY_NAME
 from app.core.plausibility import suggested_jump
+from app.core.variants import forms_of
 from app.errors import Conflict, InbandError, Invalid
-from app.language.i18n import _
 from app.loop.characteristics import actions, queries
 from app.loop.characteristics.actions import CharacteristicChange, CharacteristicIn
-from app.loop.characteristics.wording import history
+from app.loop.characteristics.wording import history, result_label
 from app.loop.machines import queries as machines
 from app.loop.programs import queries as programs
 from app.loop.readings import queries as readings
@@ -26,7 +27,6 @@ from app.quality.what_if import wording
 from app.views.set_up import parameter_form
 from app.views.set_up.frame import setup_page
 from app.web.deps import FormDep, SessionDep, Sought
-from app.web.fields import slug_of
 from app.web.forms import by_field, parsed
 from app.web.paging import Order, address, part_of
 
@@ -67,7 +67,7 @@ def characteristics_page(
 def new_characteristic_page(
     request: Request, session: SessionDep, caller: Engineer, machine: str = "", like: str = ""
 ) -> Response:
-    typed = parameter_form.typed_defaults() | {"machine": machine, "tool_memory": "", "average_memory": ""}
+    typed = parameter_form.typed_defaults() | {"machine": machine}
     if like:
         current = queries.characteristic_named(session, like)
         typed = parameter_form.typed_from(current.version.parameters) | {
@@ -79,28 +79,15 @@ def new_characteristic_page(
 
 @router.post("/setup/characteristics/new")
 def send_new_characteristic(request: Request, session: SessionDep, caller: Engineer, form: FormDep) -> Response:
-    named = {name: form.get(name, "").strip() for name in ("key", "name", "machine", "part")}
-    named["key"] = named["key"] or slug_of(named["name"])
-    filled = _with_suggestions(session, form)
+    named = {name: form.get(name, "") for name in ("key", "name", "machine", "part")}
     try:
-        if not form.get("tool_memory", "").strip():
-            raise Invalid.at("tool_memory", _("enter the tool whose offset is corrected, or 0 to measure only"))
-        new = parsed(CharacteristicIn, named | {"parameters": parameter_form.parameters_from(filled)})
+        new = parsed(CharacteristicIn, named | {"parameters": parameter_form.parameters_from(form)})
         stored = actions.add_characteristic(session, new, caller.name)
     except InbandError as error:
         if not error.errors:
             raise
-        return _new(request, session, caller, form, _all_errors(error, filled), error.status)
+        return _new(request, session, caller, form, _all_errors(error, form), error.status)
     return RedirectResponse(f"/setup/characteristics/{stored.characteristic.key}?done=added", 303)
-
-
-def _with_suggestions(session: Session, form: Mapping[str, str]) -> dict[str, str]:
-    machine = machines.find_machine(session, form.get("machine", ""))
-    if machine is None:
-        return parameter_form.with_suggestions(form, 0.0, (), AVERAGE_LOCATIONS)
-    there = queries.characteristics(session, machine_id=machine.id)
-    used = {each.parameters.average_memory for each in there}
-    return parameter_form.with_suggestions(form, machine.zero_range_floor, used, machine.average_locations)
 
 
 def _all_errors(error: InbandError, form: Mapping[str, str]) -> dict[str, str]:
@@ -184,6 +171,35 @@ def send_characteristic(
     return RedirectResponse(f"/setup/characteristics/{quote(characteristic)}?done={done}", 303)
 
 
+@router.post("/setup/characteristics/{characteristic}/forms")
+def send_form(request: Request, session: SessionDep, caller: Engineer, characteristic: str, form: FormDep) -> Response:
+    """Set up a result of its readings – roundness, run-out, taper, straightness – as a characteristic of its own."""
+    current = queries.characteristic_named(session, characteristic)
+    names = {name: form.get(name, "").strip() for name in ("key", "name")}
+    try:
+        new = parsed(
+            CharacteristicIn,
+            names
+            | {
+                "machine": current.machine.key,
+                "part": current.characteristic.part,
+                "form_of": {"characteristic": characteristic, "result": form.get("result", "")},
+                "parameters": {"upper_deviation": parameter_form.number(form.get("limit", ""))},
+            },
+        )
+        stored = actions.add_characteristic(session, new, caller.name)
+    except InbandError as error:
+        if not error.errors:
+            raise
+        session.expire_all()
+        errors = by_field(error)
+        wrong = {"result": errors.get("form_of.result"), "limit": errors.get("upper_deviation")} | errors
+        return _characteristic(
+            request, session, caller, current, status=error.status, form_typed=form, form_errors=wrong
+        )
+    return RedirectResponse(f"/setup/characteristics/{stored.characteristic.key}?done=added", 303)
+
+
 def prefilled_change(
     request: Request, session: Session, caller: Caller, current: queries.CurrentCharacteristic, typed: Mapping[str, str]
 ) -> Response:
@@ -202,8 +218,11 @@ def _characteristic(
     typed: Mapping[str, str] | None = None,
     errors: Mapping[str, str] | None = None,
     problem: InbandError | None = None,
+    form_typed: Mapping[str, str] | None = None,
+    form_errors: Mapping[str, str | None] | None = None,
 ) -> Response:
     characteristic = current.characteristic
+    forms = queries.forms(session, characteristic)
     if typed is None:
         typed = parameter_form.typed_from(current.version.parameters) | {
             "name": characteristic.name,
@@ -218,7 +237,6 @@ def _characteristic(
         characteristic=characteristic,
         machine=current.machine,
         version=current.version,
-        in_force_measures_only=current.parameters.measures_only,
         problem=problem,
         warnings=actions.warnings_of(current, queries.target_before(session, current)),
         history=history(queries.versions(session, characteristic)),
@@ -228,6 +246,17 @@ def _characteristic(
             for row in what_if.proposals(session, characteristic=characteristic, status="open")
         ],
         suggested_jump=_suggested_jump(session, current),
+        source=None if current.source is None else queries.characteristic_named(session, current.source),
+        forms=forms,
+        form_choices=[
+            (form.value, result_label(form))
+            for form in forms_of(current.parameters)
+            if form not in {each.characteristic.form for each in forms}
+        ],
+        forms_of=forms_of,
+        result_label=result_label,
+        form_typed={"key": "", "name": "", "result": "", "limit": ""} | dict(form_typed or {}),
+        form_errors=form_errors or {},
         **_form(typed, errors or {}),
     )
 
@@ -237,6 +266,12 @@ def fit(size: Annotated[str, Query(max_length=40)]) -> dict[str, str]:
     """Nominal and deviations of a size with a tolerance class (`40 h6`), as they are typed; empty for any other text."""
     found = fit_of(size)
     return {} if found is None else {name: f"{value:.10g}" for name, value in found._asdict().items()}
+
+
+@router.get("/setup/natural", response_model=None, dependencies=[require("viewer")])
+def natural(name: Annotated[str, Query(max_length=200)]) -> dict[str, str]:
+    """The limits that follow from a name: 0 is the natural one of roundness, run-out, straightness; empty for any other name."""
+    return {"natural_limit": "lower", "nominal": "0", "lower_deviation": "0"} if looks_natural(name) else {}
 
 
 def _suggested_jump(session: Session, current: queries.CurrentCharacteristic) -> float | None:
@@ -257,6 +292,7 @@ def _form(typed: Mapping[str, str], errors: Mapping[str, str]) -> dict[str, Any]
         "factors": parameter_form.factor_choices(),
         "diagram": parameter_form.diagram(typed),
         "sentences": parameter_form.sentences(),
+        "one_sided": parameter_form.sentences(natural=True),
         "short": parameter_form.short_limit,
         "micrometres": lambda name: parameter_form.micrometres(name, typed.get(name, "")),
     }

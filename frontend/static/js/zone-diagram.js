@@ -3,7 +3,7 @@
 // The server has drawn it; bands are equally tall, so what follows the typing is words alone. With every key it
 //   – writes deviation and size at each limit, target and width (L75), and the µm beside each length ([data-um]);
 //   – writes a tolerance class typed with the nominal size, 40 h6, as nominal and deviations once the field is left;
-//   – shows what an empty limit of a new characteristic takes (form[data-suggests]);
+//   – fills in 0 and the natural limit for a name such as Run-out, where nothing is typed yet and no tool is corrected;
 //   – marks a limit that breaks R33 < R34 ≤ R35/2 ≤ R37 ≤ R36, and says why at the field, in the server's own sentences.
 // The server checks the same again when the form is sent; without this script nothing is lost but the immediacy.
 
@@ -17,12 +17,16 @@ customElements.define("zone-diagram", class extends HTMLElement {
   connectedCallback() {
     this.form = this.closest("form");
     this.sentences = JSON.parse(this.dataset.sentences);
+    this.one_sided = JSON.parse(this.dataset.oneSided); // from a natural limit R35 counts whole
     this.typing = (event) => {
       this.forget(event.target);
       this.draw();
     };
     this.form.addEventListener("input", this.typing);
-    this.leaving = (event) => event.target.name === "nominal" && this.fit(event.target.value);
+    this.leaving = ({ target }) => {
+      if (target.name === "nominal") this.fit(target.value);
+      if (target.name === "name") this.natural_by(target.value);
+    };
     this.form.addEventListener("change", this.leaving);
     this.draw();
   }
@@ -37,6 +41,22 @@ customElements.define("zone-diagram", class extends HTMLElement {
     for (const [name, value] of Object.entries(numbers)) {
       this.form.elements[name].value = value;
       this.forget(this.form.elements[name]);
+    }
+    this.draw();
+  }
+
+  /** A name is a proposal: what is typed, chosen or corrected by a tool already is left alone. */
+  async natural_by(name) {
+    const fields = this.form.elements;
+    const isUntouched = () => !fields.nominal.value && !fields.lower_deviation.value && !fields.natural_limit.value
+      && !fields.target.value && !typed(fields.tool_memory.value) && fields.name.value === name;
+    if (!name || !isUntouched()) return;
+    const answer = await fetch(`${here("/setup/natural")}?${new URLSearchParams({ name: name.slice(0, 200) })}`).catch(() => null);
+    const proposed = answer?.ok ? await answer.json() : {};
+    if (!isUntouched()) return;
+    for (const [field, value] of Object.entries(proposed)) {
+      fields[field].value = value;
+      this.forget(fields[field]);
     }
     this.draw();
   }
@@ -69,20 +89,9 @@ customElements.define("zone-diagram", class extends HTMLElement {
       tolerance: usable(width) ? half : null,
       averaging_limit: values.averaging_limit ?? (usable(width) ? (half * 2) / 3 : null),
     };
-    if ("suggests" in this.form.dataset && usable(half) && half > 0) this.suggest(values, limits, half);
     this.form.elements.averaging_limit.placeholder = usable(width) && width > 0 ? plain((half * 2) / 3) : "";
     this.write(target, width, limits, natural);
-    this.explain(values, limits);
-  }
-
-  /** What an empty field of a new characteristic takes, as `app/core/suggested.py` has it; the signal path may ask for more. */
-  suggest(values, limits, half) {
-    const wear = Math.max(0.3, half);
-    const suggested = { zero_range: Math.min(Math.max(0.001, half / 10), half / 3), wear_limit: wear, confidence_limit: Math.max(1, wear) };
-    for (const [name, value] of Object.entries(suggested)) {
-      this.form.elements[name].placeholder = plain(value);
-      limits[name] = values[name] ?? value;
-    }
+    this.explain(values, limits, natural);
   }
 
   /** The side of the natural limit; where none is chosen as the server has it: 0 at best, no minus, nothing corrected. */
@@ -100,6 +109,7 @@ customElements.define("zone-diagram", class extends HTMLElement {
       group.querySelector(".deviation").textContent = usable(limit) ? `${side > 0 ? "+" : MINUS}${deviation(limit)}` : "–";
       group.querySelector(".size").textContent = usable(limit) && usable(target) ? size(target + side * limit) : "";
     }
+    for (const r of this.querySelectorAll('[data-limit="tolerance"] .r-number')) r.textContent = natural ? "R35" : "R35/2";
     this.querySelector("[data-target]").textContent = usable(target) ? size(target) : "";
     for (const [name, value] of [["target", target], ["width", width]]) {
       const output = this.form.querySelector(`[data-size="${name}"]`);
@@ -112,7 +122,7 @@ customElements.define("zone-diagram", class extends HTMLElement {
     }
   }
 
-  explain(values, limits) {
+  explain(values, limits, natural) {
     const said = new Map();
     const size = this.form.elements.nominal.value;
     const typing = /[a-z]/i.test(size) && size !== this.unknown; // a class, until the server has looked at it
@@ -125,7 +135,7 @@ customElements.define("zone-diagram", class extends HTMLElement {
       const [below, above] = [nanometres(smaller), nanometres(larger)];
       if (index === 0 ? below < above : below <= above) return;
       wrong.add(ORDER[index]).add(outer);
-      const { field, text } = this.sentences[index];
+      const { field, text } = (natural ? this.one_sided : this.sentences)[index];
       const sentence = text.replace("{smaller}", millimetres(smaller)).replace("{larger}", millimetres(larger));
       said.set(field, said.has(field) ? `${said.get(field)}. ${sentence}` : sentence);
     });

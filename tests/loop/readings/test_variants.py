@@ -14,7 +14,7 @@ pytestmark = pytest.mark.own_server  # the whole record of its database is held 
 NOTHING = dict.fromkeys(
     [
         *("run_out", "out_of_roundness", "taper", "slope", "repeat_range", "repeat_deviation"),
-        *("sections_outside", "rejected"),
+        *("sections_outside", "rejected", "straightness"),
     ]
 )
 
@@ -38,7 +38,7 @@ def touched(checked: Shop, name: str, touches: list[Any], status: int = 201) -> 
         (
             {"variant": "along", "points": 3, "index": -10},
             [[39.998], [40.0], [40.002]],
-            {"taper": 0.004, "slope": -0.0002},
+            {"taper": 0.004, "slope": -0.0002, "straightness": 0.0},
         ),
         ({"repeats": 2}, [[40.0, 40.002]], {"repeat_range": 0.002, "repeat_deviation": 0.001414214}),
         (
@@ -109,6 +109,33 @@ def test_a_batch_keeps_results_however_large(checked: Shop, server: Server) -> N
         name,
     )
     assert stored == [(603, 0.000599)]
+
+
+def test_a_batch_brings_form_too_however_large(checked: Shop) -> None:
+    """Small ones, those that could be decided in columns, and those that are copied; the next readings go on from them."""
+    name = f"{checked.characteristic}-v"
+    checked.add(name, variant="along", points=3, index=10, average_memory=0)
+    for result in ("taper", "straightness"):
+        of = {"characteristic": name, "result": result}
+        body: dict[str, Any] = {"key": f"{name}-{result}", "name": result, "machine": checked.machine, "form_of": of}
+        checked.call("POST", "/characteristics", 201, **body, parameters={"R40": 0.02})
+    for count in (2, 80, 600):
+        batch = [
+            {
+                "characteristic": name,
+                "touches": [[40.0], [40.001], [round(39.999 - at * 1e-5, 6)]],
+                "key": f"{count}:{at}",
+            }
+            for at in range(count)
+        ]
+        assert checked.admin.post("/api/v1/readings/batch", json=batch).status_code == 201
+    touched(checked, name, [[40.0], [40.001], [39.999]])
+    for result, newest in (("taper", 0.001), ("straightness", 0.0015)):
+        assert checked.call("GET", f"/characteristics/{name}-{result}/statistics")["count"] == 683
+        assert checked.call("GET", f"/readings/{name}-{result}/683")["measured"] == newest
+    # points 0, 1, -1.79 µm: the line falls by 1.79; one lies 1.263 above it, two 0.632 below
+    assert checked.call("GET", f"/readings/{name}-taper/82")["measured"] == 0.00179
+    assert checked.call("GET", f"/readings/{name}-straightness/82")["measured"] == 0.001895
 
 
 @pytest.mark.parametrize(

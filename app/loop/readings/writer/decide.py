@@ -6,6 +6,7 @@ are decided by the same lines. A reading that is refused moves nothing.
 """
 
 from collections.abc import Sequence
+from contextlib import suppress
 from datetime import UTC, datetime
 from functools import partial
 
@@ -42,10 +43,36 @@ def decide_one_by_one(
     outcomes: list[Verdict | Stored | InbandError] = []
     for entry, reading in readings:
         try:
-            outcomes.append(decide_reading(pending, entry, reading, now))
+            outcome = decide_reading(pending, entry, reading, now)
         except InbandError as refusal:
             outcomes.append(refusal)
+            continue
+        outcomes.append(outcome)
+        if isinstance(outcome, Verdict) and outcome.reading is reading:  # not one that the batch has had before
+            _decide_forms(pending, outcome, now)
     return outcomes
+
+
+def _decide_forms(pending: PendingWrites, verdict: Verdict, now: datetime) -> None:
+    """Decide the results of a reading that are characteristics of their own, as readings of the same part with the same key.
+
+    A key that somebody has given another size there before keeps that size: the reading itself is not refused for it.
+    """
+    reading = verdict.reading
+    for entry, form in verdict.stream.forms:
+        value = None if verdict.results is None else verdict.results.form(form)
+        if value is None:
+            continue
+        of_form = ReadingIn(
+            entry.characteristic,
+            measured=value,
+            key=reading.key,
+            part=reading.part,
+            measured_at=verdict.measured_at,
+            context=reading.context,
+        )
+        with suppress(Conflict):
+            decide_reading(pending, entry, of_form, now)
 
 
 def decide_reading(pending: PendingWrites, entry: Entry, reading: ReadingIn, now: datetime) -> Verdict | Stored:
@@ -66,7 +93,7 @@ def decide_reading(pending: PendingWrites, entry: Entry, reading: ReadingIn, now
         confirm(pending, stream, tool, in_effect, min(now, reading.machined_at or measured_at))
     previous_tool, outstanding, amounts, compensated = corrections_in_effect(pending, tool, reading, parameters)
     average = stream.average
-    empirical_value = average.empirical_value if average and not reading.is_by_hand else 0.0
+    empirical_value = average.empirical_value if average else 0.0
     results = results_of(parameters, reading.touches or (), points, empirical_value) if points else None
     deviation = deviation_of(measured, parameters.target, empirical_value)
     course = None

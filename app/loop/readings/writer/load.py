@@ -11,7 +11,8 @@ from typing import Any
 import msgspec
 
 from app.core.parameters import Parameters
-from app.db.pipeline import Pipeline
+from app.core.variants import FormResult
+from app.db.pipeline import Pipeline, Step
 from app.loop.readings.records import Entry
 from app.loop.readings.schemas import ReadingIn
 from app.loop.readings.writer.snapshot import (
@@ -52,6 +53,7 @@ class _Stream(msgspec.Struct, array_like=True):
     applied: list[tuple[int, float]] | None
     gain_from: int
     parts: list[Part] | None
+    forms: list[tuple[int, str, FormResult]] | None
 
 
 class _Loaded(msgspec.Struct):
@@ -75,8 +77,30 @@ async def load(
 
     optimistic: take the keys for new ones. If one is not, `save` will fail with a `UniqueViolation`.
     """
-    entries = {entry.characteristic_id: entry for entry, _ in readings}
     machines = _machines(readings)
+    await _load(
+        pipeline, book, snapshot, readings, machines, (*pipeline.begin, (LOCK, array(machines))), optimistic=optimistic
+    )
+    if of_form := [
+        (form, reading)
+        for entry, reading in readings
+        for form, _result in snapshot.streams[entry.characteristic_id].forms
+    ]:
+        await _load(pipeline, book, snapshot, of_form, machines, (), optimistic=optimistic)
+
+
+async def _load(
+    pipeline: Pipeline,
+    book: ParametersCache,
+    snapshot: Snapshot,
+    readings: Sequence[tuple[Entry, ReadingIn]],
+    machines: dict[int, dict[str, Any]],
+    opening: Sequence[Step],
+    *,
+    optimistic: bool,
+) -> None:
+    """Bring the state of these readings into the snapshot. opening: begins the transaction and locks; empty if that is done."""
+    entries = {entry.characteristic_id: entry for entry, _ in readings}
     document = {
         "streams": [
             {"machine_id": e.machine_id, "characteristic_id": e.characteristic_id, **machines[e.machine_id]}
@@ -94,9 +118,8 @@ async def load(
             if r.key is not None and not optimistic
         ],
     }
-    *_begun, locked, ((text,),) = await pipeline.run(
-        (*pipeline.begin, (LOCK, array(machines)), (LOAD, as_json(document)))
-    )
+    *opened, ((text,),) = await pipeline.run((*opening, (LOAD, as_json(document))))
+    locked = opened[-1] if opened else ()
     loaded = _loaded.decode(text or b"")
     states = [(int(machine_id or 0), int(last or 0), int(version or 0)) for machine_id, last, version in locked]
     if any(snapshot.versions.get(machine_id, version) != version for machine_id, _last, version in states):
@@ -177,4 +200,5 @@ def _add_stream(
         row.level_sequence,
         row.gain_from,
         row.parts or (),
+        [(entry._replace(characteristic_id=number, characteristic=key), form) for number, key, form in row.forms or ()],
     )

@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 from app.core.decision.decide import Decision
 from app.core.gain import LONGEST
 from app.core.parameters import Parameters
-from app.core.variants import Results
+from app.core.variants import FormResult, Results
 from app.loop.readings.records import Entry, Record
 from app.loop.readings.schemas import ReadingIn
 from app.loop.readings.writer.snapshot import (
@@ -194,6 +194,7 @@ class PendingStream:
     level_moved: bool = False
     gain_from: int = 0
     parts: list[Part] = field(default_factory=list)
+    forms: Sequence[tuple[Entry, FormResult]] = ()
     alarms: dict[str, PendingAlarm] = field(default_factory=dict)
     before: int = 0  # sequence in the snapshot
     last: "Verdict | None" = None
@@ -213,6 +214,7 @@ class PendingStream:
             self.level_sequence,
             self.gain_from,
             self.parts[-LONGEST:],
+            self.forms,
         )
 
 
@@ -273,6 +275,7 @@ class PendingWrites:
                 loaded.level_sequence,
                 gain_from=loaded.gain_from,
                 parts=list(loaded.parts),
+                forms=loaded.forms,
                 before=loaded.sequence,
             )
         return stream

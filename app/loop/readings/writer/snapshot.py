@@ -10,6 +10,7 @@ from datetime import datetime
 from typing import NamedTuple
 
 from app.core.parameters import Parameters
+from app.core.variants import FormResult
 from app.loop.readings.records import Entry
 from app.loop.readings.schemas import ReadingIn
 
@@ -86,6 +87,7 @@ class LoadedStream(NamedTuple):
 
     average, tool: locations, None without one. level: the deviation expected without corrections, mm; kept where jumps
     are looked for. gain_from: readings up to this one say nothing of the gain of corrections; parts: the newest, in order.
+    forms: the characteristics whose readings are results of these, each with the result.
     """
 
     entry: Entry
@@ -100,6 +102,7 @@ class LoadedStream(NamedTuple):
     level_sequence: int | None = None
     gain_from: int = 0
     parts: Sequence[Part] = ()
+    forms: Sequence[tuple[Entry, FormResult]] = ()
 
 
 class KnownKey(NamedTuple):

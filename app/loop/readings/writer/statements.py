@@ -99,7 +99,11 @@ SELECT json_build_object(
                         SELECT FROM exclusion e WHERE e.machine_id = r.machine_id
                             AND e.characteristic_id = r.characteristic_id AND e.sequence = r.sequence
                     )
-            ) END))
+            ) END,
+            (
+                SELECT json_agg(json_build_array(f.id, f.key, f.form) ORDER BY f.id) FROM characteristic f
+                WHERE f.machine_id = s.machine_id AND f.form_of = s.characteristic_id
+            )))
         FROM json_to_recordset((SELECT d -> 'streams' FROM doc))
             AS w(machine_id int, characteristic_id int, number int, since timestamptz)
         JOIN stream s ON s.machine_id = w.machine_id AND s.characteristic_id = w.characteristic_id
@@ -171,7 +175,7 @@ INSERT INTO reading_context (machine_id, characteristic_id, sequence, context)
 SELECT * FROM json_to_recordset($1) AS r(machine_id int, characteristic_id int, sequence bigint, context jsonb)
 """
 _RESULTS = """machine_id int, characteristic_id int, sequence bigint, run_out float8, out_of_roundness float8, taper float8,
-    slope float8, repeat_range float8, repeat_deviation float8, sections_outside smallint, rejected bool"""
+    slope float8, repeat_range float8, repeat_deviation float8, sections_outside smallint, rejected bool, straightness float8"""
 RESULTS = f"""
 INSERT INTO reading_results (machine_id, characteristic_id, sequence, {", ".join(Results._fields)})
 SELECT * FROM json_to_recordset($1) AS r({_RESULTS})

@@ -64,7 +64,13 @@ async def transact(
     begun = not optimistic or not all(snapshot.covers(entry, reading) for entry, reading in needed)
     if begun:
         await load(pipeline, parameters, snapshot, needed, optimistic=optimistic)
-    columnar = all_or_nothing and optimistic and len(readings) >= FEWEST and _keys_differ(readings)
+    columnar = (
+        all_or_nothing
+        and optimistic
+        and len(readings) >= FEWEST
+        and _keys_differ(readings)
+        and not any(snapshot.streams[number].forms for number in {entry.characteristic_id for entry, _ in readings})
+    )
     decide_all = decide_in_columns if columnar else decide_one_by_one
     pending = PendingWrites(snapshot)
     outcomes: list[Outcome] = [*decide_all(pending, readings, datetime.now(UTC))]

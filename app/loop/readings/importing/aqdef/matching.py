@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from app.core.natural import NaturalLimit, looks_natural, target_of
-from app.core.parameters import Parameters, default_averaging_limit
+from app.core.parameters import Parameters, cautious
 from app.core.plausibility import INCH, inch_warnings, looks_like_inches
 from app.files.formats.aqdef import LONGEST, Characteristic, Description
 from app.files.formats.aqdef_values import number_of
@@ -212,15 +212,11 @@ def parameters_of(content: Content) -> dict[str, Any]:
     nominal = content.target or 0.0
     width = round(upper - lower, 9)
     natural = content.natural
-    wear = max(0.3, width)
     return {
         "nominal": round(nominal, 9),
         "upper_deviation": round(upper - nominal, 9),
         "lower_deviation": round(lower - nominal, 9),
-        "zero_range": round(default_averaging_limit(width, natural) / 4, 9),
-        "wear_limit": wear,
-        "confidence_limit": max(1.0, 2 * wear),
-        "mode": "measure_only",
+        **cautious(width, natural),
         **({} if natural is None else {"natural_limit": natural.value}),
     }
 
