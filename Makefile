@@ -6,8 +6,8 @@
 # make lint    style, types, lengths, templates, and the walls between the rooms
 # make bench   the benchmarks; each prints ratios
 # make messages  collect what can be translated into frontend/locale/inband.pot
-# make wheel   what others install: dist/inband-*.whl, dist/inband_client-*.whl, dist/inband_simulators-*.whl, the sources beside
-#              them, and the libraries with their hashes: dist/libraries.txt
+# make wheel   what others install: dist/inband-*.whl, those of inband-bridge, inband-client and inband-simulators, the sources
+#              beside them, and the libraries with their hashes: dist/libraries.txt
 # make lock    write constraints.txt: versions as they are, hashes of today; ARGS=--upgrade for the newest versions
 # make audit   look the libraries up in a database of known vulnerabilities
 # make sbom    what is installed, as CycloneDX: dist/inband.cdx.json
@@ -57,8 +57,10 @@ wheel: $(VENV)/installed
 	@rm -rf dist
 	@$(BIN)/hatchling build
 	@for each in client simulators; do (cd app/$$each && $(CURDIR)/$(BIN)/hatchling build -d $(CURDIR)/dist); done
+	@cd app/bridge && $(CURDIR)/$(BIN)/hatchling build -t wheel -d $(CURDIR)/dist
 	@sed '/^# For extras/,$$d' constraints.txt > dist/libraries.txt
 	@sed '/^# For building/,$$d' constraints.txt > dist/libraries-with-extras.txt
+	@$(BIN)/python .ci/lock.py --bridge > dist/libraries-of-the-bridge.txt
 
 lock: $(VENV)/installed-tools
 	@$(BIN)/python .ci/lock.py $(BIN)/uv $(ARGS)

@@ -15,6 +15,7 @@ HEAD = """\
 # `make wheel` writes the part that an installation needs: dist/libraries.txt, for pip install --require-hashes -r
 """
 EXTRAS = ["pyproject.toml", *(f"--extra={each}" for each in ("opcua", "heidenhain", "mqtt", "serial", "notify"))]
+BRIDGE = ["app/bridge/pyproject.toml", "--all-extras"]
 # What each section is for, and what it holds beyond those before it. `make` and the Dockerfile know the headings.
 SECTIONS = {
     "# For the server": ["pyproject.toml"],
@@ -23,6 +24,7 @@ SECTIONS = {
     "# For tests": [*EXTRAS, "build", "--extra=dev"],
     "# For make lock and make audit": ["pyproject.toml", "build", "--all-extras"],
 }
+OF_BRIDGE = "# inband-bridge, with all of its extras, needs of these:\n"
 BUILD = "hatchling\neditables\n"  # pip builds an editable installation with them
 PIN = re.compile(r"^([A-Za-z0-9._-]+)==", re.MULTILINE)
 
@@ -49,8 +51,19 @@ def main(uv: str, *more: str) -> None:
             names = PIN.findall(compiled(uv, folder, folder / "part.txt", "-c", str(whole), *words))
             parts += ["\n", heading, "\n", *(f"{pins[each]}\n" for each in names if each not in written)]
             written.update(names)
-        place.write_text("".join(parts))
+        of_bridge = PIN.findall(compiled(uv, folder, folder / "part.txt", "-c", str(whole), *BRIDGE))
+        place.write_text("".join([*parts, "\n", OF_BRIDGE, *(f"#     {each}\n" for each in of_bridge)]))
+
+
+def libraries_of_the_bridge() -> str:
+    """The part of constraints.txt that inband-bridge needs, with all of its extras."""
+    text, _, names = Path("constraints.txt").read_text().partition(OF_BRIDGE)
+    pins = {PIN.match(block)[1]: block for block in re.findall(r"^\S+==(?:.*\\\n)+.*\n", text, re.MULTILINE)}  # type: ignore[index]
+    return "".join(pins[each] for each in names.replace("#", "").split())
 
 
 if __name__ == "__main__":
-    main(*sys.argv[1:])
+    if sys.argv[1:] == ["--bridge"]:
+        print(libraries_of_the_bridge(), end="")
+    else:
+        main(*sys.argv[1:])

@@ -161,7 +161,8 @@ class TestContent:
             if not path.is_relative_to(HOUSE / "app" / "simulators")
         }
         wanted = {name.removeprefix("app/client/") for name in wanted}
-        wanted -= {"pyproject.toml", "README.md", "LICENSE"}  # of the distribution inband-client
+        for folder in ("", "app/bridge/"):  # of the distributions inband-client and inband-bridge
+            wanted -= {f"{folder}{name}" for name in ("pyproject.toml", "README.md", "LICENSE")}
         there = {name for name in ZipFile(built / WHEEL).namelist() if not name.startswith(f"{NAME}.dist-info/")}
         assert there == wanted
 

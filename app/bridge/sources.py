@@ -1,9 +1,11 @@
 """Sources of lines that a machine prints: a serial port, a TCP connection, a port that listens, a file that grows."""
 
 import asyncio
+import contextlib
 import errno
 import os
 import socket
+import threading
 import time
 from collections.abc import Callable
 from datetime import datetime
@@ -190,7 +192,7 @@ class SerialPort(One[L]):
             import serial
         except ModuleNotFoundError as error:
             raise Misconfigured(
-                "A serial port needs pyserial, which is not installed. Install inband[serial]."
+                "A serial port needs pyserial, which is not installed. Install inband-bridge[serial], or inband[serial]."
             ) from error
         settings = self.settings
 
@@ -228,8 +230,43 @@ class SerialPort(One[L]):
             ) from error
         reader = asyncio.StreamReader()
         loop = asyncio.get_running_loop()
-        transport, _ = await loop.connect_read_pipe(lambda: asyncio.StreamReaderProtocol(reader), port)
+        try:
+            transport, _ = await loop.connect_read_pipe(lambda: asyncio.StreamReaderProtocol(reader), port)
+        except NotImplementedError:  # Windows: its selectors know sockets alone
+            return reader, ReadByThread(port, reader, loop)
         return reader, transport
+
+
+class ReadByThread:
+    """A serial port that a thread reads, where the event loop cannot wait for one."""
+
+    def __init__(self, port: Any, reader: asyncio.StreamReader, loop: asyncio.AbstractEventLoop) -> None:
+        self._port, self._reader, self._loop = port, reader, loop
+        self._closing = False
+        port.timeout = 0.2  # s: as long as closing takes
+        threading.Thread(target=self._pump, name=f"serial port {port.name}", daemon=True).start()
+
+    def _pump(self) -> None:
+        words = None
+        try:
+            while not self._closing:
+                if data := self._port.read(max(1, self._port.in_waiting)):
+                    self._loop.call_soon_threadsafe(self._reader.feed_data, data)
+        except Exception as error:  # noqa: BLE001 - as where it is opened
+            words = OSError(0, _reason(error))
+        finally:
+            self._port.close()
+        with contextlib.suppress(RuntimeError):  # the loop has ended before the thread
+            if words is None:
+                self._loop.call_soon_threadsafe(self._reader.feed_eof)
+            else:
+                self._loop.call_soon_threadsafe(self._reader.set_exception, words)
+
+    def close(self) -> None:
+        """End it, within a moment."""
+        self._closing = True
+        with contextlib.suppress(Exception):  # it may have ended by itself
+            self._port.cancel_read()
 
 
 def _refuses_framing(error: Exception) -> bool:

@@ -7,13 +7,14 @@ Exit status: 0 done, 1 failed, 2 wrong use. A part of the house adds its command
     @cli.command()
     def replay(...) -> None: ...
 
-and names that module in ``PARTS``.
+and names that module in ``PARTS``. The distribution inband-bridge carries the last two alone.
 """
 
 import sys
 from importlib import import_module
+from importlib.util import find_spec
 
-from app.cli.base import cli, explain, say
+from app.cli.base import SERVER, cli, explain, say
 
 PARTS = (
     "app.cli.serve",
@@ -35,7 +36,8 @@ PARTS = (
 def main() -> None:
     """Run the command; errors that people can do something about are said in words, not as a stack trace."""
     for part in PARTS:
-        import_module(part)
+        if SERVER or find_spec(part):
+            import_module(part)
     try:
         cli(prog_name="inband")
     except KeyboardInterrupt:

@@ -4,6 +4,8 @@ import json
 import platform
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
+from enum import StrEnum
+from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -23,13 +25,18 @@ cli = typer.Typer(
     add_completion=False,
 )
 people = Console(stderr=True, highlight=False)
+SERVER = find_spec("app.db") is not None
+"""This is more than the distribution inband-bridge: decisions/0064."""
 
 
 def _tell_version(wanted: bool) -> None:
     if wanted:
-        from app.db.migrate import head
+        schema = ""
+        if SERVER:
+            from app.db.migrate import head
 
-        typer.echo(f"inband {__version__} (Python {platform.python_version()}, schema {head()})")
+            schema = f", schema {head()}"
+        typer.echo(f"inband {__version__} (Python {platform.python_version()}{schema})")
         raise typer.Exit
 
 
@@ -59,6 +66,31 @@ DatabaseUrl = Annotated[
     typer.Option(
         envvar="INBAND_DATABASE_URL", help="A PostgreSQL of your own.", show_default="embedded, in the data folder"
     ),
+]
+
+
+class Level(StrEnum):
+    """The least that is logged."""
+
+    DEBUG = "debug"
+    INFO = "info"
+    WARNING = "warning"
+    ERROR = "error"
+
+
+class LogFormat(StrEnum):
+    """Format of the log."""
+
+    TEXT = "text"
+    JSON = "json"
+
+
+LogLevel = Annotated[
+    Level | None, typer.Option(envvar="INBAND_LOG_LEVEL", help="The least that is logged.", show_default="info")
+]
+LogForm = Annotated[
+    LogFormat | None,
+    typer.Option("--log-format", envvar="INBAND_LOG_FORMAT", help="How it is logged.", show_default="text"),
 ]
 
 
@@ -196,6 +228,17 @@ def opened(url: str, settings: "Settings") -> Iterator["Database"]:
 
 def explain(error: Exception) -> tuple[str | None, int]:
     """Message and exit status for an error; no message for a fault of the program."""
+    if isinstance(error, InbandError):
+        fields = [
+            f"  {problem_field.field}: {problem_field.message}"
+            for problem_field in error.errors
+            if problem_field.message not in error.detail
+        ]
+        return "\n".join([error.detail, *fields, *([error.what_to_do] if error.what_to_do else [])]), 1
+    return _explain_server(error) if SERVER else (None, 1)
+
+
+def _explain_server(error: Exception) -> tuple[str | None, int]:
     from psycopg import OperationalError as Away
     from pydantic import ValidationError
     from sqlalchemy.exc import OperationalError
@@ -209,13 +252,6 @@ def explain(error: Exception) -> tuple[str | None, int]:
         case ValidationError():
             lines = [_setting(problem) for problem in error.errors(include_url=False, include_input=False)]
             return "\n".join(lines), 2
-        case InbandError():
-            fields = [
-                f"  {problem_field.field}: {problem_field.message}"
-                for problem_field in error.errors
-                if problem_field.message not in error.detail
-            ]
-            return "\n".join([error.detail, *fields, *([error.what_to_do] if error.what_to_do else [])]), 1
         case EmbeddedServerError() | BinariesError() | MigrationError():
             return str(error), 1
         case OperationalError() | Away() if held_up(getattr(error, "orig", error)):

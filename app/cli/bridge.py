@@ -2,7 +2,6 @@
 
 import asyncio
 import contextlib
-import signal
 from collections.abc import Callable, Coroutine
 from datetime import datetime
 from pathlib import Path
@@ -11,8 +10,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from app import logs
-from app.cli.base import cli, say
-from app.cli.serve import LogForm, LogLevel
+from app.bridge.loops import ended_by_signals, run_selecting
+from app.cli.base import LogForm, LogLevel, cli, say
 from app.errors import InbandError
 
 if TYPE_CHECKING:
@@ -72,7 +71,7 @@ def _with_store(
         store = store_of(configuration)
         try:
             with store.alone() if alone else contextlib.nullcontext():
-                asyncio.run(work(configuration, store))
+                run_selecting(work(configuration, store))
         finally:
             store.close()
     except StoreError as error:
@@ -92,10 +91,7 @@ def run_bridge(
 
     async def work(configuration: "Configuration", store: "Store") -> None:
         running = asyncio.create_task(program.run(configuration, store))
-        loop = asyncio.get_running_loop()
-        for end in (signal.SIGINT, signal.SIGTERM):
-            loop.add_signal_handler(end, running.cancel)
-        with contextlib.suppress(asyncio.CancelledError):
+        with contextlib.suppress(asyncio.CancelledError), ended_by_signals(running):
             await running
 
     _with_store(config, work, alone=True)
@@ -109,7 +105,7 @@ def check_bridge(config: ConfigFile = PLANT) -> None:
     """
     from app.bridge.checking import check
 
-    findings = asyncio.run(check(_configuration(config)))
+    findings = run_selecting(check(_configuration(config)))
     for finding in findings:
         say(str(finding), style=None if finding.good else "bold red")
     if not all(finding.good for finding in findings):
@@ -273,7 +269,9 @@ def certificate(
     try:
         from app.bridge.certificates import write_pair
     except ModuleNotFoundError as error:
-        raise InbandError(f"{error.name} is not installed.", "Install inband[opcua].") from error
+        raise InbandError(
+            f"{error.name} is not installed.", "Install inband-bridge[opcua], or inband[opcua]."
+        ) from error
     try:
         public, key, uri = write_pair(folder, host or gethostname())
     except FileExistsError as error:

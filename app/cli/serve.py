@@ -10,7 +10,6 @@ import threading
 import time
 from collections.abc import Callable
 from contextlib import ExitStack, suppress
-from enum import StrEnum
 from functools import partial
 from multiprocessing import parent_process
 from pathlib import Path
@@ -20,7 +19,18 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from app import __version__, core, logs
-from app.cli.base import DatabaseUrl, DataDir, cli, opened, reachable, remember_address, say, settings_from
+from app.cli.base import (
+    DatabaseUrl,
+    DataDir,
+    LogForm,
+    LogLevel,
+    cli,
+    opened,
+    reachable,
+    remember_address,
+    say,
+    settings_from,
+)
 from app.cli.plants import migrate_all
 from app.db.disk import watch
 from app.errors import InbandError
@@ -39,31 +49,6 @@ END_WITHIN = 5.0
 Host = Annotated[str | None, typer.Option(envvar="INBAND_HOST", help="Address to listen on.", show_default="127.0.0.1")]
 Port = Annotated[int | None, typer.Option(envvar="INBAND_PORT", help="Port to listen on.", show_default="8000")]
 Workers = Annotated[int | None, typer.Option(envvar="INBAND_WORKERS", help="Server processes.", show_default="1")]
-
-
-class Level(StrEnum):
-    """The least that is logged."""
-
-    DEBUG = "debug"
-    INFO = "info"
-    WARNING = "warning"
-    ERROR = "error"
-
-
-class LogFormat(StrEnum):
-    """Format of the log."""
-
-    TEXT = "text"
-    JSON = "json"
-
-
-LogLevel = Annotated[
-    Level | None, typer.Option(envvar="INBAND_LOG_LEVEL", help="The least that is logged.", show_default="info")
-]
-LogForm = Annotated[
-    LogFormat | None,
-    typer.Option("--log-format", envvar="INBAND_LOG_FORMAT", help="How it is logged.", show_default="text"),
-]
 
 
 @cli.command()

@@ -6,7 +6,7 @@ from importlib.util import find_spec
 import typer
 
 from app import __version__
-from app.cli.base import cli
+from app.cli.base import SERVER, cli
 from app.cli.bridge import bridge
 from app.errors import InbandError
 
@@ -23,14 +23,17 @@ def say_how_to_get(group: typer.Typer, name: str, command: str, what: str) -> No
     def missing() -> None:
         raise InbandError(
             f"`{command}` belongs to the distribution inband-simulators, which is not installed.",
-            f"Install inband-simulators {__version__} beside this Inband, in the same environment: "
-            f"pip install inband-simulators=={__version__}, or the file inband_simulators-{__version__}-py3-none-any.whl.",
+            f"Install inband_simulators-{__version__}-py3-none-any.whl, which is made beside Inband's own wheel, into the same "
+            "environment: pip install --no-deps FILE",
         )
 
 
-if find_spec("app.simulators"):
+THERE = find_spec("app.simulators") is not None
+if THERE:
     import_module("app.simulators.simulate")
-    import_module("app.simulators.demonstrate")
 else:
     say_how_to_get(bridge, "simulate", "inband bridge simulate", "A simulated control")
+if THERE and SERVER:
+    import_module("app.simulators.demonstrate")
+elif SERVER:
     say_how_to_get(cli, "demo", "inband demo", "The demonstration plant")

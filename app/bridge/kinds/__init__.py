@@ -44,5 +44,5 @@ def kind_named(name: str) -> ModuleType:
         if name not in EXTRAS:
             raise
         raise KindError(
-            f"kind = {name!r} needs {error.name}, which is not installed. Install inband[{EXTRAS[name]}]."
+            f"kind = {name!r} needs {error.name}, which is not installed. Install inband-bridge[{EXTRAS[name]}], or inband[{EXTRAS[name]}]."
         ) from error

@@ -7,7 +7,6 @@ part. Anyone who is not connected misses what is printed.
 import asyncio
 import contextlib
 import os
-import tty
 
 from app.core.printed_line import DECIMALS, END, START, Printed, check_of
 from app.core.ring import SLOTS, Register, Slot, Unit
@@ -35,10 +34,13 @@ class PrintingSimulator:
         """Listen; 0 takes a free port."""
         self._server = await asyncio.start_server(self._serve, "127.0.0.1", port)
         self.port = self._server.sockets[0].getsockname()[1]
-        ours, theirs = os.openpty()
-        tty.setraw(theirs)
-        os.set_blocking(ours, False)
-        self._terminal, self.device = (ours, theirs), os.ttyname(theirs)
+        if hasattr(os, "openpty"):  # Windows has no pseudo terminals
+            import tty
+
+            ours, theirs = os.openpty()
+            tty.setraw(theirs)
+            os.set_blocking(ours, False)
+            self._terminal, self.device = (ours, theirs), os.ttyname(theirs)
         self._task = asyncio.create_task(self._print_new())
 
     async def stop(self) -> None:
