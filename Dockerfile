@@ -1,4 +1,5 @@
-# Inband and its simulators, as wheels; it wants a PostgreSQL 18 (docker-compose.yml brings one) and a proxy with https before it.
+# Inband and its simulators, as wheels. It serves with the PostgreSQL that one of the libraries carries where INBAND_DATABASE_URL
+# names no other: `docker run` is a whole plant, `docker run ... inband demo` the demonstration (docs/how-to/run-for-real.md).
 # Both images are named to the release of Debian; a digest pins them to the byte:
 #     docker build --build-arg PYTHON=python:3.13-slim-trixie@sha256:... .
 ARG PYTHON=python:3.13-slim-trixie

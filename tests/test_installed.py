@@ -23,6 +23,7 @@ from app.db import migrate
 from app.db.embedded import EmbeddedServer
 from app.db.engine import Database
 from app.db.run_as import run_as
+from app.settings import Settings
 from tests import keeper
 from tests.conftest import Process, Server, free_port, short_folder, wait_ready
 from tests.shop import Shop
@@ -90,8 +91,18 @@ def run(command: Sequence[object], folder: Path, **environment: str) -> subproce
     )
 
 
+def image_environment() -> dict[str, str]:
+    """Of a container, as the Dockerfile and the command in the documentation set it; the port and the folder are a test's own."""
+    last = (HOUSE / "Dockerfile").read_text().split("\nFROM ")[2].replace("\\\n", " ")
+    (command,) = re.findall(
+        r"^    (docker run -d .+ inband)$", (HOUSE / "docs/how-to/run-for-real.md").read_text(), re.MULTILINE
+    )
+    found = re.findall(r"(?:^ENV | )(INBAND_\w+)=(\S+)", f"{last}\n{command}", re.MULTILINE)
+    return {name: value for name, value in found if name not in {"INBAND_PORT", "INBAND_DATA_DIR"}}
+
+
 class Installed(Server):
-    """A server from the wheel, on the embedded PostgreSQL, as a user who may write into the data folder only."""
+    """A server from the wheel, as the image runs it: on the embedded PostgreSQL, as a user who may write the data folder only."""
 
     data_dir: Path
 
@@ -122,7 +133,12 @@ def installed(programs: Path) -> Iterator[Installed]:
         def start() -> Process:
             with stderr.open("ab") as log:
                 process = subprocess.Popen(
-                    command, cwd=empty, env=bare(), stdin=subprocess.DEVNULL, stdout=log, stderr=log
+                    command,
+                    cwd=empty,
+                    env=bare(**image_environment()),
+                    stdin=subprocess.DEVNULL,
+                    stdout=log,
+                    stderr=log,
                 )
             wait_ready(f"http://127.0.0.1:{port}", process, stderr)
             return process
@@ -268,6 +284,13 @@ class TestContainer:
                     shutil.copy(HOUSE / source, tmp_path / target)
         again = build(tmp_path, tmp_path / "wheels", "wheel")
         assert (again / WHEEL).read_bytes() == (built / WHEEL).read_bytes()
+
+    def test_one_container_listens_to_others_and_wants_no_other_database(self) -> None:
+        environment = image_environment()
+        assert environment["INBAND_HOST"] == "0.0.0.0"
+        assert "INBAND_DATABASE_URL" not in environment
+        said = {name.removeprefix("INBAND_").lower(): value for name, value in environment.items()}
+        assert Settings(**said).database_url is None
 
     def test_the_dockerfile_may_copy_what_it_copies(self) -> None:
         first = (HOUSE / "Dockerfile").read_text().split("\nFROM ")[1]
