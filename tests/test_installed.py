@@ -12,6 +12,7 @@ import tarfile
 import venv
 from collections.abc import Iterator, Sequence
 from pathlib import Path
+from typing import Any
 from zipfile import ZipFile
 
 import httpx
@@ -289,7 +290,7 @@ class TestContainer:
         environment = image_environment()
         assert environment["INBAND_HOST"] == "0.0.0.0"
         assert "INBAND_DATABASE_URL" not in environment
-        said = {name.removeprefix("INBAND_").lower(): value for name, value in environment.items()}
+        said: dict[str, Any] = {name.removeprefix("INBAND_").lower(): value for name, value in environment.items()}
         assert Settings(**said).database_url is None
 
     def test_the_dockerfile_may_copy_what_it_copies(self) -> None:

@@ -20,11 +20,9 @@ through (a capability) instead of the home being opened.
 
 import contextlib
 import errno
-import fcntl
 import hashlib
 import logging
 import os
-import pwd
 import shutil
 import signal
 import subprocess
@@ -37,9 +35,15 @@ from pathlib import Path
 
 import psycopg
 
+with contextlib.suppress(
+    ModuleNotFoundError
+):  # Windows has neither, and no server is embedded there: `EmbeddedServer.start`
+    import fcntl
+    import pwd
+
 from app.db.binaries import MAJOR, BinariesError, binary
 from app.db.locks import LockError, exclusive, open_lock
-from app.db.run_as import PATH, RunAsError, give, run_as, system_user
+from app.db.run_as import PATH, RunAsError, give, is_root, run_as, system_user
 
 NAME = "inband"  # of the database and of its role
 SYSTEM_USER = "inband-postgres"
@@ -161,6 +165,11 @@ class EmbeddedServer:
 
     def start(self) -> str:
         """Make the cluster if there is none, start the server if it does not run, and say where it is."""
+        if not hasattr(os, "posix_spawn"):
+            raise EmbeddedServerError(
+                "On Windows no PostgreSQL comes with Inband. Install PostgreSQL 18, make a database, and name it: "
+                "--database-url or INBAND_DATABASE_URL."
+            )
         make_data_dir(self.data_dir)
         used_before = self._users_lock is not None
         try:
@@ -279,7 +288,7 @@ class EmbeddedServer:
                 "made it (pg_dump), start this one with a new --data-dir and restore the dump there (pg_restore)."
             )
 
-    def _owner(self) -> pwd.struct_passwd:
+    def _owner(self) -> "pwd.struct_passwd":
         """Whom the server runs as: this user, or for root the one the cluster belongs to, or the system user."""
         if os.geteuid() != 0:
             return pwd.getpwuid(os.geteuid())
@@ -289,7 +298,7 @@ class EmbeddedServer:
                 return owner
         return system_user(SYSTEM_USER)
 
-    def _as(self, owner: pwd.struct_passwd) -> list[str]:
+    def _as(self, owner: "pwd.struct_passwd") -> list[str]:
         return run_as(owner, reads=[binary("postgres")], enters=[self.data_dir])
 
     # --- the process
@@ -418,7 +427,7 @@ def make_data_dir(path: Path) -> None:
 
     Root's server runs as somebody else, who must pass through; nothing in it is open to him but what is his.
     """
-    _make_private(path, 0o711 if os.geteuid() == 0 else 0o700)
+    _make_private(path, 0o711 if is_root() else 0o700)
 
 
 def _make_private(path: Path, mode: int = 0o700) -> None:

@@ -1,11 +1,16 @@
 """Locks between processes, by files. The system opens them when a process ends, however it ends."""
 
-import fcntl
+import contextlib
 import os
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
+
+from app.db.run_as import is_root
+
+with contextlib.suppress(ModuleNotFoundError):  # Windows, where no database is embedded that would need them
+    import fcntl
 
 
 class LockError(Exception):
@@ -21,7 +26,7 @@ def open_lock(path: Path) -> int:
             f"{path.parent} cannot be written ({error.strerror}). Run Inband as the user the folder belongs to, "
             "or choose another with --data-dir."
         ) from None
-    if os.geteuid() == 0:  # sudo in somebody's folder must not lock them out
+    if is_root():  # sudo in somebody's folder must not lock them out
         owner = path.parent.stat()
         os.fchown(lock, owner.st_uid, owner.st_gid)
     return lock

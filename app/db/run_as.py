@@ -2,11 +2,13 @@
 
 import contextlib
 import os
-import pwd
 import shutil
 import subprocess
 from collections.abc import Sequence
 from pathlib import Path
+
+with contextlib.suppress(ModuleNotFoundError):  # Windows
+    import pwd
 
 PATH = "/usr/local/sbin:/usr/local/bin:/usr/sbin:/usr/bin:/sbin:/bin"
 CAP_DAC_OVERRIDE, CAP_DAC_READ_SEARCH, CAP_SETPCAP = 1, 2, 8  # bit numbers, capabilities(7)
@@ -16,7 +18,12 @@ class RunAsError(Exception):
     """It cannot be run as somebody else; the message says why and what to do."""
 
 
-def system_user(name: str) -> pwd.struct_passwd:
+def is_root() -> bool:
+    """Tell if this process may do everything; on Windows none is known to."""
+    return hasattr(os, "geteuid") and os.geteuid() == 0
+
+
+def system_user(name: str) -> "pwd.struct_passwd":
     """The system user ``name``, made when there is none: no home, no shell, no password."""
     useradd = shutil.which("useradd", path=PATH)
     for command in ([useradd] if useradd else []), []:
@@ -33,13 +40,13 @@ def system_user(name: str) -> pwd.struct_passwd:
     )
 
 
-def run_as(user: pwd.struct_passwd, *, reads: Sequence[Path], enters: Sequence[Path]) -> list[str]:
+def run_as(user: "pwd.struct_passwd", *, reads: Sequence[Path], enters: Sequence[Path]) -> list[str]:
     """The words before a command that make root run it as ``user``; none when this process is not root.
 
     Where ``user`` may not get to what it ``reads`` or ``enters`` because it lies in a closed home, it gets the right to pass
     (CAP_DAC_READ_SEARCH, or where a container has not got that, CAP_DAC_OVERRIDE); the home stays closed.
     """
-    if os.geteuid() != 0:
+    if not is_root():
         return []
     setpriv = shutil.which("setpriv", path=PATH)
     if setpriv is None:
@@ -62,9 +69,9 @@ def run_as(user: pwd.struct_passwd, *, reads: Sequence[Path], enters: Sequence[P
     )
 
 
-def give(path: Path, user: pwd.struct_passwd, *, recursive: bool = False) -> None:
+def give(path: Path, user: "pwd.struct_passwd", *, recursive: bool = False) -> None:
     """Root makes ``path`` the user's; others do nothing, for it is theirs already."""
-    if os.geteuid() == 0:
+    if is_root():
         for entry in [path, *(path.rglob("*") if recursive else [])]:
             os.chown(entry, user.pw_uid, user.pw_gid, follow_symlinks=False)
 

@@ -38,7 +38,8 @@ PATIENCE = 3  # times the limit of processor time may pass by the clock
 YESTERDAY = 24 * 3600.0  # s
 PREFIX = "inband-file-"
 PROGRAM = "from app.files.apart import begin; begin()"
-OUT_OF_MEMORY, OUT_OF_ROOM, DISK_FULL = 10, 11, 12  # as it ends
+OUT_OF_MEMORY, OUT_OF_ROOM, DISK_FULL, OUT_OF_TIME = 10, 11, 12, 13  # as it ends
+ENDED_BY_TIME = {OUT_OF_TIME, *(-getattr(signal, name) for name in ("SIGXCPU", "SIGKILL") if hasattr(signal, name))}
 
 
 @dataclass(frozen=True)
@@ -76,7 +77,10 @@ def apart(work: Callable[..., Result], *given: Any, limits: Limits | None = None
 
 
 def _run(folder: Path, limits: Limits) -> int:
-    environment = {"PATH": os.environ.get("PATH", ""), "PYTHONPATH": str(Path(app.__path__[0]).parent)}
+    environment = {
+        name: os.environ[name] for name in ("PATH", "SYSTEMROOT") if name in os.environ
+    }  # Windows needs that one
+    environment["PYTHONPATH"] = str(Path(app.__path__[0]).parent)
     command = [sys.executable, "-W", "ignore", "-c", PROGRAM, str(folder), str(os.getpid())]
     try:
         return subprocess.run(  # noqa: S603 - our own words
@@ -89,7 +93,7 @@ def _run(folder: Path, limits: Limits) -> int:
             check=False,
         ).returncode
     except subprocess.TimeoutExpired:
-        return -signal.SIGXCPU
+        return OUT_OF_TIME
 
 
 def _result(path: Path, code: int, limits: Limits, work: Callable[..., Any]) -> Any:
@@ -109,7 +113,7 @@ def _result(path: Path, code: int, limits: Limits, work: Callable[..., Any]) -> 
 
 
 def _reason(code: int, limits: Limits) -> str:
-    if code in {-signal.SIGXCPU, -signal.SIGKILL}:
+    if code in ENDED_BY_TIME:
         return _("This file takes longer to read than the {most} s that it may.").format(most=limits.seconds)
     if code == OUT_OF_MEMORY:
         most = limits.memory // MEGABYTE
@@ -188,8 +192,12 @@ def _end_with(parent: int) -> None:
 
 def _keep(limits: Limits) -> None:
     global _room  # noqa: PLW0603 - of the process
-    import resource
-
+    _room = limits.written
+    sys.modules["numpy"] = None  # type: ignore[assignment] # openpyxl does without, and begins in half the time
+    try:
+        import resource
+    except ModuleNotFoundError:  # Windows: the clock of the server is the only limit
+        return
     os.nice(5)
     for kind, most in (
         (resource.RLIMIT_CPU, limits.seconds),
@@ -200,5 +208,3 @@ def _keep(limits: Limits) -> None:
         with suppress(OSError, ValueError):  # a stricter one is there already
             resource.setrlimit(kind, (most, most + (kind == resource.RLIMIT_CPU)))
     signal.signal(signal.SIGXCPU, signal.SIG_DFL)
-    _room = limits.written
-    sys.modules["numpy"] = None  # type: ignore[assignment] # openpyxl does without, and begins in half the time

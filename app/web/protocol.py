@@ -7,19 +7,25 @@ and however long it takes, so strangers could hold the door with some connection
 
 import asyncio
 import json
-import resource
 from functools import cache
 from http import HTTPStatus
+from importlib import import_module
+from importlib.util import find_spec
 from typing import Any, Literal, cast
 
 from uvicorn.protocols.http.flow_control import FlowControl
 from uvicorn.protocols.http.httptools_impl import HttpToolsProtocol, RequestResponseCycle
+
+resource: Any = import_module("resource") if find_spec("resource") else None
+"""Python's module of that name; Windows has none."""
 
 LIVE = "/api/v1/events"
 MOST_HEAD = 64 * 1024
 """Bytes of a request's line and headers; browsers send some hundreds."""
 OTHER_FILES = 256
 """Open files kept for the database, logs and templates; all others may be connections."""
+MOST_OF_WINDOWS = 512
+"""Sockets that its `select` waits for at once."""
 LINGER = 1.0
 """Seconds in which a refused client may read why, while what it still sends is thrown away."""
 
@@ -229,12 +235,16 @@ class ServerProtocol(HttpToolsProtocol):
 @cache
 def most_connections() -> int:
     """Return how many connections this process may serve: the files it may open, less those it needs itself."""
+    if resource is None:
+        return MOST_OF_WINDOWS - OTHER_FILES
     soft, _hard = resource.getrlimit(resource.RLIMIT_NOFILE)
     return 2**31 if soft == resource.RLIM_INFINITY else max(soft - OTHER_FILES, soft // 2)
 
 
 def raise_file_limit() -> None:
     """Let this process open as many files as the system allows; the usual 1,024 are few for a plant's live pages."""
+    if resource is None:
+        return
     soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
     target = 65_536 if hard == resource.RLIM_INFINITY else min(hard, 65_536)
     if soft != resource.RLIM_INFINITY and soft < target:

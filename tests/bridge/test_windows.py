@@ -1,4 +1,4 @@
-"""The bridge where modules and calls fail as on Windows: `tests.bridge.as_on_windows`. Nobody has run it on Windows itself."""
+"""The bridge where modules and calls fail as on Windows: `tests.as_on_windows`. Nobody has run it on Windows itself."""
 
 import asyncio
 import signal
@@ -57,7 +57,8 @@ def stored(shop: Shop) -> list[float]:
 
 
 def test_every_module_is_imported_and_a_reading_arrives_and_ctrl_c_ends_it(shop: Shop, tmp_path: Path) -> None:
-    command = [sys.executable, "-m", "tests.bridge.as_on_windows", "bridge", "--config", str(plant(shop, tmp_path))]
+    rooms = "app.bridge,app.simulators.controls"
+    command = [sys.executable, "-m", "tests.as_on_windows", rooms, "bridge", "--config", str(plant(shop, tmp_path))]
     with (tmp_path / "log").open("w") as log:
         bridge = subprocess.Popen(command, stderr=log)
     try:

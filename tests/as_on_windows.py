@@ -1,6 +1,6 @@
-"""Runs the command `inband` where modules and calls fail as they do on Windows. It is no Windows: paths, files and sockets are not.
+"""Runs the command `inband` after importing all of some rooms, where modules and calls fail as they do on Windows. It is no Windows: paths, files and sockets are not.
 
-What the standard library needs for itself on this system is imported first, and goes on having it.
+What the standard library and platformdirs need on this system is imported first, and goes on having it.
 """
 
 import asyncio
@@ -14,11 +14,10 @@ import sqlite3  # noqa: F401
 import subprocess  # noqa: F401
 import sys
 import tempfile  # noqa: F401
-from collections.abc import Sequence
 from importlib import import_module
-from importlib.machinery import ModuleSpec
-from types import ModuleType
 from typing import Any, NoReturn
+
+import platformdirs  # noqa: F401
 
 MISSING = {"fcntl", "grp", "pty", "pwd", "resource", "syslog", "termios", "tty", "uvloop"}
 CALLS = [
@@ -36,11 +35,10 @@ CALLS = [
     "setgid",
     "setsid",
     "setuid",
-    "uname",
 ]
 FLAGS = ["O_CLOEXEC", "O_DIRECTORY", "O_NOFOLLOW", "O_NONBLOCK", "POSIX_SPAWN_OPEN"]
 SIGNALS = ["SIGALRM", "SIGCHLD", "SIGHUP", "SIGKILL", "SIGPIPE", "SIGQUIT", "SIGUSR1", "SIGUSR2"]
-OF_LOOPS = [
+NOT_OF_LOOPS = [
     "add_signal_handler",
     "remove_signal_handler",
     "connect_read_pipe",
@@ -52,18 +50,6 @@ OF_LOOPS = [
 ]
 OF_THE_PROACTOR = ["add_reader", "remove_reader", "add_writer", "remove_writer"]
 IN_NO_NAME = set('<>:"|?*')
-
-
-class Missing:
-    """Finds nothing of what Windows does not have."""
-
-    @staticmethod
-    def find_spec(
-        name: str, _path: Sequence[str] | None = None, _target: ModuleType | None = None
-    ) -> ModuleSpec | None:
-        if name.partition(".")[0] in MISSING:
-            raise ModuleNotFoundError(f"No module named {name!r}", name=name)
-        return None
 
 
 def missing(*_: Any, **__: Any) -> NoReturn:
@@ -86,28 +72,24 @@ def no_such_name(event: str, words: tuple[Any, ...]) -> None:
 
 
 def become_windows() -> None:
-    for name in MISSING:
-        sys.modules.pop(name, None)
-    sys.meta_path.insert(0, Missing)
+    sys.modules.update(dict.fromkeys(MISSING))  # type: ignore[arg-type] # Python's way to say that there is none
     for module, names in ((os, CALLS + FLAGS), (signal, SIGNALS)):
         for name in names:
             delattr(module, name)
-    for name in OF_LOOPS:
+    for name in NOT_OF_LOOPS:
         setattr(asyncio.unix_events._UnixSelectorEventLoop, name, missing)
     for name in OF_THE_PROACTOR:
         setattr(Proactor, name, missing)
     asyncio.unix_events._UnixDefaultEventLoopPolicy._loop_factory = Proactor  # type: ignore[attr-defined]
-    os.rename = rename
+    os.rename = rename  # type: ignore[assignment]
     sys.addaudithook(no_such_name)
 
 
 if __name__ == "__main__":
     become_windows()
-    import app.bridge
-    import app.simulators.controls
     from app.cli import main
 
-    for room in (app.bridge, app.simulators.controls):
-        for found in pkgutil.walk_packages(room.__path__, f"{room.__name__}."):
+    for name in sys.argv.pop(1).split(","):
+        for found in pkgutil.walk_packages(import_module(name).__path__, f"{name}."):
             import_module(found.name)
     main()
