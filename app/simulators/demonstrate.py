@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from app.cli.base import DatabaseUrl, DataDir, cli, say, settings_from
-from app.cli.serve import Host, LogForm, LogLevel, Port, run
+from app.cli.base import DatabaseUrl, DataDir, LogForm, LogLevel, cli, say, settings_from
+from app.cli.serve import Host, Port, run
 from app.language.i18n import _
 
 if TYPE_CHECKING:

@@ -94,7 +94,7 @@ def test_it_runs_where_nothing_of_the_server_is_and_takes_little_room(shop: Shop
     assert json.loads(there.stdout) == []
     log = tmp_path / "log"
     with log.open("w") as stderr:
-        command = [python, "-m", "app", "bridge", "--config", plant(shop, tmp_path)]
+        command = [str(python), "-m", "app", "bridge", "--config", str(plant(shop, tmp_path))]
         bridge = subprocess.Popen(command, cwd=tmp_path, env=bare(), stderr=stderr)
     try:
         until(lambda: stored(shop) or bridge.poll() is not None)
