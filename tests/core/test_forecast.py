@@ -22,8 +22,8 @@ from app.core.forecast import (
     widening_after,
 )
 from app.core.wear import Fit, Values, fit
+from app.quality.proof.wear_lives import life, operation
 from tests.chance import by_chance, runs, seed
-from tests.core.wear_lives import life, operation
 
 WIDENINGS = st.floats(0, 4)
 

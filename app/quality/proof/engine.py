@@ -7,6 +7,7 @@ import numpy as np
 from app.core.decision.decide import LoopState, decide
 from app.core.decision.step import Action, average_of
 from app.core.fits import fit_of
+from app.core.forecast import LOOKS, backtest, forecast
 from app.core.parameters import mean_nominal, read
 from app.core.spc import chance, constants, cusum, ewma, shewhart
 from app.core.spc.capability import (
@@ -29,9 +30,11 @@ from app.core.spc.rules import RULES, Rule, RuleName, signals, signals_of_cusum
 from app.core.spc.spread import Estimator, Sigma, freedom_of_moving_ranges, from_ranges, subgroups, summary
 from app.core.spc.tolerance_interval import fewest_for_extremes, k_by_howe, k_one_sided, k_two_sided
 from app.core.uncertainty import position_uncertainty
+from app.core.wear import fit
 from app.quality.proof import engine_of_gauges as gauges
 from app.quality.proof import geometry
 from app.quality.proof.example_input import Given, Got, readings_of
+from app.quality.proof.wear_lives import life, operation
 
 
 def decision(given: Given) -> Got:
@@ -336,12 +339,34 @@ def following(given: Given) -> Got:
     return {"statistic": successive(given["values"]).statistic}
 
 
+def parts_left(given: Given) -> Got:
+    """Shares of the forecasts at each moment of a tool life that hold the parts that it really takes.
+
+    Of each operation so many edges that are over teach the width, then one that is left out of them is forecast.
+    """
+    rng = np.random.default_rng(given["seed"])
+    held: dict[float, list[bool]] = {share: [] for share in LOOKS}
+    for _operation in range(given["operations"]):
+        of = operation(rng)
+        over = [life(of, rng) for _edge in range(given["edges_before"])]
+        widening = backtest([(np.arange(1, len(curve) + 1), curve) for curve in over]).widening
+        curve = life(of, rng)
+        for share in LOOKS:
+            now = int(len(curve) * share)
+            line = fit(np.arange(1, now + 1), curve[:now])
+            told = None if line is None else forecast(line, 1.0, widening)
+            if told is not None:
+                held[share].append(told.low <= len(curve) - now <= told.high)
+    return {f"held_at_{share:.0%}".rstrip("%"): float(np.mean(each)) for share, each in held.items()}
+
+
 ENGINE: dict[str, Callable[[Given], Got]] = {
     "decision": decision,
     "mean_nominal": nominal,
     "fits": fits,
     "running_average": running_average,
     "signal_path": signal_path,
+    "parts_left": parts_left,
     "summary": summed_up,
     "constants": factors,
     "d2_star": duncan,

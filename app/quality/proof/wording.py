@@ -12,6 +12,7 @@ def topics() -> dict[str, tuple[str, tuple[str, ...]]]:
             _("Decision and measuring"),
             ("decision", "mean_nominal", "fits", "running_average", "signal_path"),
         ),
+        "forecast": (_("Parts left of a tool"), ("parts_left",)),
         "summary": (_("Mean, spread, autocorrelation"), ("summary",)),
         "charts": (
             _("Control charts"),

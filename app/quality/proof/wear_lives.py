@@ -1,4 +1,4 @@
-"""Tool lives made up in the shapes that are published, for tests of forecasts; docs/reference/wear.md states parameters and sources."""
+"""Tool lives made up in the shapes that are published, for the proof of forecasts; docs/reference/wear.md states parameters and sources."""
 
 from typing import Any
 
