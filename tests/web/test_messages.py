@@ -117,6 +117,6 @@ def test_messages_are_extracted_from_code_and_templates(tmp_path: Path) -> None:
     assert done.returncode == 0, done.stderr
     text = catalog.read_text()
     assert 'msgid "Skip to content"' in text  # base.html
-    assert 'msgid "averaging is stored"' in text  # the zone chart
+    assert 'msgid "averaging is stored (zero compensation)"' in text  # the zone chart
     assert "msgid_plural" in text
     assert " tests/" not in text  # each place stands behind a blank; app/…/touch_tests/ is one

@@ -16,21 +16,15 @@ TOLERANCE, LIMIT, TARGET = Pen("ink", 1.75), Pen("faint", 1), Pen("quiet", 1, "4
 
 
 def limit_title(limit: str, limits: HasLimits) -> str:
-    """The name of a limit in the manual; of R34 its true share of the half tolerance, which the manual puts at ⅔."""
+    """The name of a limit, as everywhere else; of R34 its true share of the half tolerance, which the manual puts at ⅔."""
     return {
-        "R33": _("zero compensation"),
-        "R34": _share_title(limits),
+        "R33": _("zero range"),
+        "R34": _("averaging limit ({share})").format(share=_share(limits)),
         "R35/2": _("tolerance"),
         "R35": _("tolerance"),
-        "R37": _("dimensional difference"),
-        "R36": _("safe area"),
+        "R37": _("wear limit"),
+        "R36": _("confidence limit"),
     }[limit]
-
-
-def _share_title(limits: HasLimits) -> str:
-    whole = half_of(limits) == limits.tolerance_width
-    text = _("{share} of the tolerance") if whole else _("{share} of the half tolerance")
-    return text.format(share=_share(limits))
 
 
 def _share(limits: HasLimits) -> str:
@@ -43,16 +37,14 @@ def _share(limits: HasLimits) -> str:
 
 
 def band_text(band: Band, sign: int) -> str:
-    """Action of the loop in a band, above (+1) or below (-1) the target, in the words of the manual's diagram."""
+    """What happens in a band, above (+1) or below (-1) the target, with the alarm; the word of the manual's diagram in brackets."""
     return {
-        "zero": _("averaging is stored"),
+        "zero": f"<b>{_('Good')}</b>, {_('averaging is stored (zero compensation)')}",
         "average": _("averaging and correction"),
-        "full": _("correction of current deviation"),
-        "out_of_tolerance": _("correction of current deviation, alarm “oversize”")
-        if sign > 0
-        else _("correction of current deviation, alarm “undersize”"),
-        "wear": _("alarm “permissible dimensional difference overrun”"),
-        "probe_fault": _("alarm “safe area overrun”"),
+        "full": _("corrected in full"),
+        "out_of_tolerance": _("corrected in full → Oversize") if sign > 0 else _("corrected in full → Undersize"),
+        "wear": _("→ Tool worn (dimensional difference)"),
+        "probe_fault": _("→ Probe fault (safe area)"),
     }[band.name]
 
 
@@ -133,7 +125,7 @@ def limit_labels(limits: HasLimits, ruler: Scale, size: int, *, brief: bool = Fa
                     notes.append(_note(sign * (lower + upper) / 2, band_text(band, sign), "quiet", size))
                 elif sign > 0 or ruler.natural.side:
                     middle_of = sign * (lower + upper) / 2 if ruler.natural.side else 0
-                    notes.append(_note(middle_of, band_text(band, sign), "quiet", size))
+                    notes.append(_note(middle_of, band_text(band, sign), "ink", size))
             elif room > 1.6 * LEAST_DISTANCE and band.number > 0:
                 place = max((max(lower, written) + upper) / 2, written + LEAST_DISTANCE * height)
                 written = place

@@ -88,7 +88,7 @@ def zone_chart(
         ends = [end for block in blocks for end in (block.minimum, block.maximum)]
         ruler = TrueScale.of(limits, [*(point.deviation for point in points), *ends])
     # Room at the right for the longest words in the font of any system (Liberation Sans and 5 % more).
-    letters, left, right = (14, 104, 342) if width >= WIDE else (12, 92, 292) if width >= NARROW else (12, 64, 104)
+    letters, left, right = (14, 104, 322) if width >= WIDE else (12, 92, 276) if width >= NARROW else (12, 64, 104)
     brief = width < NARROW
     first = min([block.first for block in blocks] + [point.sequence for point in points], default=1)
     last = max([block.last for block in blocks] + [point.sequence for point in points], default=first + 9)

@@ -193,15 +193,17 @@ class TestLabels:
         words = texts(zone_chart([], SHAFT))
         for limit in ("R33  +1 µm", "R33  −1 µm", "R34  +5.3 µm", "R35/2  −8 µm", "R37  +300 µm", "R36  −1 mm"):
             assert limit in words
-        assert words.count("averaging is stored") == 1
+        assert words.count("<b>Good</b>, averaging is stored (zero compensation)") == 1
         for both in (
             "averaging and correction",
-            "alarm “safe area overrun”",
-            "alarm “permissible dimensional difference overrun”",
+            "→ Probe fault (safe area)",
+            "→ Tool worn (dimensional difference)",
+            "wear limit",
+            "confidence limit",
         ):
             assert words.count(both) == 2
-        assert words.count("correction of current deviation") == 4
-        assert words.count("“oversize”") == words.count("“undersize”") == 1
+        assert words.count("corrected in full") == 4
+        assert words.count("→ Oversize") == words.count("→ Undersize") == 1
 
     @pytest.mark.parametrize("scale", ["zones", "true"])
     def test_a_phone_has_names_and_values_and_most_of_its_width_for_the_readings(self, scale: Any) -> None:
@@ -215,8 +217,8 @@ class TestLabels:
 
     def test_oversize_is_above(self) -> None:
         notes = {note["text"]: note["y"] for note in zone_chart([], SHAFT)["layout"]["annotations"]}
-        assert next(y for text, y in notes.items() if "“oversize”" in text) == 3.5
-        assert next(y for text, y in notes.items() if "“undersize”" in text) == -3.5
+        assert next(y for text, y in notes.items() if "→ Oversize" in text) == 3.5
+        assert next(y for text, y in notes.items() if "→ Undersize" in text) == -3.5
 
     def test_the_left_axis_has_the_sizes(self) -> None:
         axis = zone_chart([], SHAFT, sizes=SizeAxis(39.992))["layout"]["yaxis"]
@@ -231,8 +233,8 @@ class TestLabels:
     )
     def test_r34_says_its_true_share_of_the_half_tolerance(self, averaging_limit: float, share: str) -> None:
         some = SimpleNamespace(**vars(SHAFT) | {"averaging_limit": averaging_limit})
-        titles = [text for text in texts(zone_chart([], some)).split("\n") if "half tolerance" in text]
-        assert all(text.endswith(f"  {share} of the half tolerance") for text in titles)
+        titles = [text for text in texts(zone_chart([], some)).split("\n") if "averaging limit" in text]
+        assert all(text.endswith(f"  averaging limit ({share})") for text in titles)
         assert len(titles) == 2
 
     @pytest.mark.parametrize("scale", ["zones", "true"])
