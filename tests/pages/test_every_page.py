@@ -4,6 +4,7 @@ the screen, nothing that axe finds, no pale words, targets as large as a finger 
 The list is held against the routes of the application, so a new page is in it or the test fails.
 """
 
+import io
 from collections.abc import Iterator
 from typing import Any, NamedTuple
 from urllib.parse import urlsplit
@@ -11,6 +12,7 @@ from urllib.parse import urlsplit
 import pytest
 from axe_playwright_python.base import AXE_SCRIPT
 from playwright.sync_api import Browser, Page, expect
+from pypdf import PdfReader
 
 from app.access import devices
 from tests.conftest import Server, new_page
@@ -158,6 +160,41 @@ def test_a_page_is_in_order(
             small[size] = found
     said, complaints[:] = complaints[:], []
     assert (said, headings, wide, pale, axe, small) == ([], 1, {}, [], {}, {}), page.url
+
+
+PRINTED = {"/", "/overview", "/characteristics/{characteristic}"}
+"""Pages whose paper is looked at in the short run, too."""
+
+CONTROLS = """() => [...document.querySelectorAll(
+    "button, .button, .tabs, .choice, .picker, .rail, .foot, .chart-strip, form[method=get], form[method=get] *")]
+    .filter((each) => each.checkVisibility() && !each.matches(".sorts, .why > button")).map((each) => each.outerHTML.slice(0, 120))"""
+MOST_SHEETS = 24  # of a page of this house
+
+
+@pytest.mark.parametrize(
+    "address",
+    [address if address in PRINTED else pytest.param(address, marks=pytest.mark.long) for address in ADDRESSES],
+)
+def test_a_page_prints_without_controls_and_with_whole_words(
+    visitor: tuple[Page, list[str]], values: dict[str, Any], address: str
+) -> None:
+    page, complaints = visitor
+    resize(page, "desk")
+    opened(page, address.format(**values))
+    page.emulate_media(media="print")
+    controls = page.evaluate(CONTROLS)
+    page.emulate_media(media="null")
+    sheets, broken = {}, {}
+    for way in ("upright", "across"):
+        printed = PdfReader(io.BytesIO(page.pdf(format="A4", landscape=way == "across"))).pages
+        sheets[way] = len(printed)
+        lines = [line.strip() for sheet in printed for line in sheet.extract_text().splitlines()]
+        letters = "".join("x" if len(line) == 1 and line.isalpha() else " " for line in lines)
+        if "xxxx" in letters:
+            broken[way] = lines[letters.index("xxxx") - 1 :][:20]
+    complaints.clear()
+    assert (controls, broken) == ([], {})
+    assert max(sheets.values()) <= MOST_SHEETS, sheets
 
 
 @pytest.mark.parametrize("size", SIZES)
