@@ -8,7 +8,7 @@ from app.access.deps import AnyCaller
 from app.core.spc.machine_performance import RUN
 from app.loop.characteristics import queries as characteristics
 from app.quality.capability.chart import drawn
-from app.quality.capability.figures import histogram, probability
+from app.quality.capability.figures import histogram, index_over_weeks, probability
 from app.quality.capability.machine_queries import newest_run
 from app.quality.capability.request import StudyRequestDep, study_of
 from app.quality.capability.schemas import (
@@ -17,6 +17,8 @@ from app.quality.capability.schemas import (
     capability_out,
     machine_performance_out,
 )
+from app.quality.capability.verdict_queries import states
+from app.quality.capability.weekly import tool_changes, weeks_of
 from app.web.api import FIGURE, CharacteristicKey, Theme, api_router, chart_answer, problems
 from app.web.deps import FROM_REPLICA, SessionDep
 
@@ -68,3 +70,14 @@ def get_capability_figure(
     current = characteristics.characteristic_for(session, caller, characteristic, "viewer")
     chart = drawn(study_of(session, current, choice))
     return chart_answer((histogram if picture == "histogram" else probability)(chart), theme)
+
+
+@router.get("/characteristics/{characteristic}/figures/weeks", responses=problems(404) | FIGURE, response_model=None)
+def get_weeks_figure(
+    session: SessionDep, caller: AnyCaller, characteristic: CharacteristicKey, theme: Theme = "light"
+) -> Response:
+    """The index of each of the last 13 weeks with its interval, and when tools were changed; computed every few minutes."""
+    current = characteristics.characteristic_for(session, caller, characteristic, "viewer")
+    ((_state, stored),) = states(session, current.machine.id, current.characteristic.id)
+    weeks = weeks_of(stored.newest.weeks if stored.newest else None)
+    return chart_answer(index_over_weeks(weeks, tool_changes(session, current, weeks)), theme)

@@ -2,24 +2,43 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from datetime import datetime, time, timedelta
 from math import ceil, exp, pi, sqrt
 from typing import Any
 
 import numpy as np
 from scipy.special import ndtri
 
-from app.charts import Axis, Bars, Chart, Dots, Mark, Note, Panel, Pen, Room, Rule, Series, Share, nothing
-from app.core.spc.capability import Limits
+from app.charts import (
+    Axis,
+    Bars,
+    Chart,
+    Dots,
+    Mark,
+    Note,
+    Panel,
+    Pen,
+    Room,
+    Rule,
+    Series,
+    Share,
+    nothing,
+    time_axis,
+)
+from app.core.spc.capability import CAPABLE, VERY_CAPABLE, Limits
 from app.core.spc.fitting import Fitted, density
 from app.core.spc.refusal import Floats
 from app.core.spc.spread import far_off
 from app.language.i18n import _, ngettext
 from app.language.numbers import signed
+from app.language.times import plant_zone
 from app.quality.capability import fit_wording
+from app.quality.capability.kinds import Week
 
 MOST_BARS, FEWEST_BARS = 60, 8
 CURVE = 161  # points of a drawn curve
 MOST_POINTS, TAIL = 600, 40  # of the probability plot, and of each of its ends that are drawn whichever
+MOST_CHANGES = 60  # lines of tool changes; more are a fence
 SHARES = (0.00135, 0.01, 0.05, 0.25, 0.5, 0.75, 0.95, 0.99, 0.99865)
 
 
@@ -212,3 +231,48 @@ def _limit_lines(drawn: CapabilityChart, low: float, high: float, *, percentiles
 def _chart(marks: Sequence[Mark], low: float, high: float, height: Axis) -> Chart:
     deviation = Axis(_("Deviation, µm"), reach=(low * 1000, high * 1000), format="+.4~g", ticks=9)
     return Chart([Panel(marks, height)], deviation, Room(76, 28, 96, 44), legend="below")
+
+
+def index_over_weeks(weeks: Sequence[Week], changes: Sequence[datetime]) -> Chart:
+    """The index of each week with its interval, against 1, 1.33 and 1.67; dotted, where a tool was changed (unless that is a fence)."""
+    known = [week for week in weeks if week.value is not None]
+    if not known:
+        return nothing(_("No week has an index yet; it is computed every few minutes"))
+    x = [datetime.combine(week.begins, time(12), plant_zone()) + timedelta(days=3) for week in known]
+    marks: list[Mark] = [
+        *(Rule(Pen("faint", 1, "dot"), x=at) for at in (changes if len(changes) <= MOST_CHANGES else ())),
+        *(Rule(Pen("quiet", 1, "4px,4px"), y=mark, words=f"{mark:.2f}") for mark in (1.0, CAPABLE, VERY_CAPABLE)),
+        *(
+            Series(
+                [at, at],
+                [week.low if week.low is not None else 0.0, week.high if week.high is not None else week.value],
+                Pen("steady", 4),
+                meta="interval",
+            )
+            for at, week in zip(x, known, strict=True)
+        ),
+        Series(
+            x,
+            [week.value for week in known],
+            Pen("faint", 1.2),
+            Dots(size=9, colour="ink"),
+            meta="index",
+            hover=[f"{week.value:.2f}<br>{week.readings}" for week in known],
+        ),
+    ]
+    highest = max(2.0, *(week.high or week.value or 0.0 for week in known))
+    return Chart(
+        [
+            Panel(
+                marks,
+                Axis(
+                    _("Cpk or Ppk"),
+                    reach=(min(0.0, *(week.value or 0.0 for week in known)), highest * 1.05),
+                    format=".2f",
+                    ticks=6,
+                ),
+            )
+        ],
+        time_axis(x),
+        Room(64, 60, 44, 16),
+    )

@@ -1,6 +1,7 @@
 """The index of each characteristic as a periodic job worked it out, so that the overview need not. Lengths in mm."""
 
 from datetime import datetime
+from typing import Any
 
 from sqlalchemy import BigInteger, ForeignKeyConstraint, func
 from sqlalchemy.orm import Mapped, mapped_column
@@ -43,3 +44,4 @@ class CapabilityVerdict(Base):
     high: Mapped[float | None]
     preliminary: Mapped[bool]
     why: Mapped[str | None]
+    weeks: Mapped[dict[str, Any] | None]  # `app.quality.capability.weekly`; of the newest readings' row only

@@ -4,6 +4,7 @@ The same window and the same decision as on the page of a characteristic. Where 
 older than it may be, the index is worked out on the spot, for a bounded number of characteristics.
 """
 
+from collections.abc import Sequence
 from dataclasses import replace
 from datetime import UTC, datetime, timedelta
 from typing import NamedTuple
@@ -14,8 +15,10 @@ from sqlalchemy.orm import Session
 from app.core.spc.quoting import RULE, Quote, WhyNot
 from app.loop.characteristics.queries import characteristic_named
 from app.loop.summaries import queries as statistics
+from app.quality.capability.kinds import Week
 from app.quality.capability.queries import USUAL, Judgement, judgement_of
 from app.quality.capability.tables import CapabilityVerdict
+from app.quality.capability.weekly import weeks_of
 
 DUE_SHARE, DUE_AFTER = 0.02, timedelta(minutes=10)
 """The job works an index out again after so many new readings, as a share of those it is of, or after so long with any."""
@@ -60,10 +63,11 @@ class Stored(NamedTuple):
 
 
 class Verdict(NamedTuple):
-    """The index to show. now: why the newest readings carry none (`Quoting.why`), where an older one is shown."""
+    """The index to show, and those of the last weeks. now: why the newest readings carry none (`Quoting.why`), where an older one is shown."""
 
     of: CapabilityVerdict
     now: str | None = None
+    weeks: Sequence[Week] = ()
 
 
 def verdicts_by_characteristic(session: Session, machine_id: int | None = None) -> dict[int, Verdict]:
@@ -72,12 +76,13 @@ def verdicts_by_characteristic(session: Session, machine_id: int | None = None) 
     verdicts = {}
     for state, stored in states(session, machine_id):
         newest, before = stored
+        weeks = weeks_of(newest.weeks if newest else None)
         if left and (newest is None or is_older(newest, state, now, OLD_SHARE, OLD_AFTER)):
             newest, before = verdicts_of(session, state, before)
             left -= 1
         newest = newest or _not_yet()
         verdicts[state.characteristic_id] = (
-            Verdict(newest) if newest.quotable or before is None else Verdict(before, newest.why)
+            Verdict(newest, weeks=weeks) if newest.quotable or before is None else Verdict(before, newest.why, weeks)
         )
     return verdicts
 

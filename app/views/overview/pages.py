@@ -9,7 +9,7 @@ from app.access.deps import require
 from app.core.spc.capability import CAPABLE
 from app.loop.machines import queries as machines
 from app.quality.capability import wording as capability_wording
-from app.quality.capability.pictures import stored_interval
+from app.quality.capability.pictures import stored_interval, trend
 from app.quality.capability.queries import USUAL
 from app.quality.proof.queries import failing
 from app.quality.proof.wording import warning
@@ -85,8 +85,9 @@ def overview_page(
         capable=CAPABLE,
         alarm_flood=ALARM_FLOOD,
         last=USUAL,
-        trend=TREND,
+        newest=TREND,
         interval=stored_interval,
+        weekly=trend,
         spark=lambda row: sparkline(row.trend, row.parameters),
         used=lambda row: tolerance_bar(row.trend, row.parameters),
         capability_wording=capability_wording,

@@ -4,6 +4,7 @@ from collections import Counter
 from dataclasses import dataclass
 from datetime import UTC, datetime, timedelta
 from enum import StrEnum
+from statistics import fmean
 from typing import Any
 
 from sqlalchemy import func, select
@@ -35,6 +36,7 @@ class By(StrEnum):
     ALARMS = "alarms"
     NAME = "name"
     LAST = "last"
+    TREND = "trend"
 
     @property
     def largest_first(self) -> bool:
@@ -110,7 +112,15 @@ def _value(ranked: Ranked, by: By) -> Any:
         By.ALARMS: inputs.per_shift,
         By.NAME: row.characteristic.name.casefold(),
         By.LAST: row.stream.last_received_at,
+        By.TREND: _change(ranked.verdict),
     }[by]
+
+
+def _change(verdict: Verdict) -> float | None:
+    """Change of the index from the earlier half of its weeks to the later one; None before there are two."""
+    values = [week.value for week in verdict.weeks if week.value is not None]
+    half = len(values) // 2
+    return fmean(values[half:]) - fmean(values[:half]) if half else None
 
 
 def _raised(session: Session, machine_id: int | None, now: datetime) -> Counter[int]:

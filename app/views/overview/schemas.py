@@ -1,6 +1,6 @@
 """The ranking as JSON."""
 
-from datetime import datetime
+from datetime import date, datetime
 from typing import Literal
 
 from pydantic import BaseModel, Field
@@ -17,6 +17,16 @@ class AttentionReasonOut(BaseModel):
 
     code: str
     text: str
+
+
+class WeekOut(BaseModel):
+    """The index of the readings measured in one week."""
+
+    begins: date = Field(description="Its Monday, by the plant's clock.")
+    readings: int = Field(description="Number of readings that count.")
+    value: float | None = Field(description="The index that may be quoted of them; null where none may.")
+    low: float | None = Field(description="Its 95 % interval; null where it has none.")
+    high: float | None = Field(description="Its 95 % interval; null where it has none.")
 
 
 class RankedOut(BaseModel):
@@ -48,6 +58,9 @@ class RankedOut(BaseModel):
     judged_at: datetime = Field(description="When it was worked out.")
     now: str | None = Field(
         description="Why the newest readings carry no index, where the last one that could be quoted is kept; else null."
+    )
+    weeks: list[WeekOut] = Field(
+        description="The index of each of the last 13 weeks that has readings, the oldest first, as the periodic job worked it out."
     )
     parts_left: float | None = Field(description="Parts until wear comes to the first limit, as foretold.")
     signals: list[int] = Field(description="Numbers of the open signals.")
@@ -85,6 +98,7 @@ class Overview(BaseModel):
                     last_reading=entry.verdict.of.last,
                     judged_at=entry.verdict.of.at,
                     now=capability.why_not(entry.verdict.now) if entry.verdict.now else None,
+                    weeks=[WeekOut(**week._asdict()) for week in entry.verdict.weeks],
                     parts_left=entry.inputs.parts_left,
                     signals=entry.signals,
                     alarms=entry.inputs.alarms,

@@ -112,8 +112,8 @@ def test_a_line_of_the_page_has_pictures_and_its_words_on_demand(ranking: Shop, 
 
 
 def test_the_characteristics_of_a_part_show_the_tolerance_they_use(ranking: Shop, viewer: Person) -> None:
-    ranking.call("PATCH", f"/characteristics/{ranking.machine}-wide", part="Ring 7")
-    opened = viewer.open("/overview?part=Ring%207")
+    ranking.call("PATCH", f"/characteristics/{ranking.machine}-wide", part=f"Ring {ranking.machine}")
+    opened = viewer.open(f"/overview?part=Ring%20{ranking.machine}")
     assert re.findall(r'<tr id="c-([^"]+)"', opened) == [f"{ranking.machine}-wide"]
     assert (
         "The last 24 deviations lie between −7.0 µm and +7.0 µm; the tolerance is ±8.0 µm about the target"
