@@ -125,6 +125,19 @@ def is_jump(now: float, level: float | None, allowed: float) -> bool:
     return level is not None and abs(nanometres(now - level)) > nanometres(allowed)
 
 
+def is_doubtful(deviation: float, half: float, wear_limit: float, natural_side: int = 0) -> bool:
+    """Tell if a size that a person typed is asked about before it is taken: it is more likely a slip of the finger.
+
+    It lies off by more than the whole tolerance, or as far as a worn tool, or beyond a natural limit. half: distance from the
+    target to the limits, mm; natural_side: of the natural limit, -1 below, 1 above.
+
+    >>> is_doubtful(0.012, 0.008, 0.3), is_doubtful(-0.0161, 0.008, 0.3), is_doubtful(-0.001, 0.01, 0.3, -1)
+    (False, True, True)
+    """
+    off = nanometres(abs(deviation))
+    return off > nanometres(2 * half) or off >= nanometres(wear_limit) or nanometres(deviation) * natural_side > 0
+
+
 def moved(level: float | None, now: float) -> float:
     """The level after a plausible reading: level + (reading - level) / 2, from the first reading on.
 

@@ -84,6 +84,21 @@ def short(value: float | None, digits: int = 6) -> str:
     return f"{MINUS if value < 0 else ''}{abs(value):.{digits}g}"
 
 
+def deserved(half_mm: float, deviation_mm: float | None = None) -> int:
+    """Decimals that a deviation in µm deserves, read from two metres: a tolerance of some µm more, one of a tenth of a mm none.
+
+    half_mm: distance from the target to the tolerance limits; a deviation close to one is never rounded across it.
+
+    >>> deserved(0.002), deserved(0.008), deserved(0.1), deserved(0.1, 0.1004)
+    (2, 1, 0, 1)
+    """
+    usual = 2 if half_mm < 0.0025 else 1 if half_mm < 0.1 else 0
+    if deviation_mm is None:
+        return usual
+    limit = round(half_mm * 1000, 6)
+    return decimals_beside(round(deviation_mm * 1000, 6), usual, limit, -limit)
+
+
 def um(deviation_mm: float | None, decimals: int = 1) -> str:
     r"""A deviation in µm with its sign.
 

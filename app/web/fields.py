@@ -40,6 +40,17 @@ def is_slug(text: str) -> bool:
     return _SLUG.fullmatch(text) is not None
 
 
+def slug_of(name: str) -> str:
+    """The key that a name suggests; empty where the name has no Latin letter or digit.
+
+    >>> slug_of("Bearing seat Ø40 h6"), slug_of("Fräse 2"), slug_of("Вал")
+    ('bearing-seat-d40-h6', 'frase-2', '')
+    """
+    plain = unicodedata.normalize("NFKD", name.replace("Ø", "d").replace("ø", "d").replace("ß", "ss"))
+    letters = plain.encode("ascii", "ignore").decode().lower()
+    return re.sub(r"[^a-z0-9]+", "-", letters).strip("-")[:64].rstrip("-")
+
+
 def _slug(text: str) -> str:
     if not is_slug(text):
         raise PydanticCustomError("slug", "not a key")

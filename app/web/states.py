@@ -1,6 +1,6 @@
 """States that pages show as a badge: zones, alarm kinds, statuses of corrections; each with its word, tone and icon.
 
-A tone is how urgent a state is (`steady`, `waiting`, `wear`, `attention`, `stop`); an icon is one of `icons.html`. Never
+A tone is how urgent a state is (`URGENCY`); an icon is one of `icons.html`. Never
 colour alone: shape, word and colour together. A room adds the states that it owns with `show`.
 """
 
@@ -8,6 +8,9 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from app.language.i18n import _
+
+URGENCY = ("stop", "wear", "attention", "waiting", "steady")
+"""Tones, the most urgent first."""
 
 
 @dataclass(frozen=True, slots=True)

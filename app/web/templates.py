@@ -58,6 +58,7 @@ def environment() -> Environment:
         tolerance=lambda of: numbers.tolerance_um(of.half, of.natural_limit),
         mm=numbers.mm,
         in_um=numbers.in_um,
+        deserved=lambda of, deviation=None: numbers.deserved(of.half, deviation),
         plain_um=numbers.plain_um,
         signed=numbers.signed,
         beside=numbers.beside,

@@ -78,13 +78,14 @@ class Size:
 class Question:
     """Content of a confirmation dialog: what follows, reasons to choose from, where it is sent, and hidden fields.
 
-    where: the place at the machine that it is about.
+    likely: the reason that is chosen already; where: the place at the machine that it is about.
     """
 
     title: str
     button: str
     follows: list[str]
     reasons: list[str] = field(default_factory=list)
+    likely: str = ""
     size: Size | None = None
     send_to: str = ""
     hidden: dict[str, str] = field(default_factory=dict)
@@ -114,7 +115,8 @@ class Act(Generic[On, Sent]):
 class Verb(Act[On, Sent]):
     """An act with its question. A title names the `values` of the subject as {number}, the sentence afterwards {n}.
 
-    word: on its button; follows: the consequences; reasons: likely ones; size: the length that is asked for; said: afterwards.
+    word: on its button; follows: the consequences; reasons: likely ones; likely: the one that is chosen already, because it
+    claims nothing that the person has to have looked at; size: the length that is asked for; said: afterwards.
     when: states of the thing in which it is offered; fits: tells if it can be asked of this one.
     """
 
@@ -123,6 +125,7 @@ class Verb(Act[On, Sent]):
     follows: Callable[[On], list[str]]
     said: Callable[[], str]
     reasons: Callable[[], list[str]] = list
+    likely: Callable[[], str] = str
     size: Callable[[On], Size] | None = None
     hidden: Callable[[On], dict[str, str]] = lambda _on: {}
     when: tuple[str, ...] = ()
@@ -136,6 +139,7 @@ class Verb(Act[On, Sent]):
             self.word(),
             self.follows(on),
             self.reasons(),
+            self.likely(),
             self.size(on) if self.size else None,
             send_to,
             {"do": self.name, **self.hidden(on), **hidden},

@@ -26,9 +26,11 @@ PAGES = {
     ],
     "/station/{machine}/corrections/{number}": ["/station/{machine}/corrections/{waiting}?do=approve"],
     "/station/{machine}/note": ["/station/{machine}/note"],
+    "/station/{machine}/sizes": ["/station/{machine}/sizes"],
     "/notes": ["/notes", "/notes?machine={machine}", "/notes?characteristic={characteristic}"],
     "/notes/new": ["/notes/new?machine={machine}", "/notes/new?characteristic={characteristic}&sequence=3"],
     "/notes/{number}": ["/notes/{note}"],
+    "/station/{machine}/tools/{number}/corrections": ["/station/{machine}/tools/5/corrections"],
     "/station/{machine}/tools/{number}/change": ["/station/{machine}/tools/3/change"],
     "/characteristics/{characteristic}": [
         "/characteristics/{characteristic}",

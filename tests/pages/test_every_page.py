@@ -50,6 +50,7 @@ BESIDE_THE_MACHINE = {
     "/station/{machine}",
     "/station/{machine}/alarms/{alarm}?action=measured_by_hand",
     "/station/{machine}/tools/3/change",
+    "/station/{machine}/sizes",
     "/alarms",
     "/alarms/{alarm}",
     "/alarms/{alarm}?action=keep_cutting",

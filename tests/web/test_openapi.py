@@ -425,7 +425,9 @@ FORMS: dict[str, tuple[str, ...] | None] = {
     "/station/{machine}/alarms/{number}": None,  # on a device it is asked who acts: tests/views/station
     "/station/{machine}/corrections/{number}": None,
     "/station/{machine}/note": None,
+    "/station/{machine}/sizes": None,
     "/station/{machine}/tools/{number}/change": None,
+    "/station/{machine}/tools/{number}/corrections": None,
     "/sign-out": None,
     "/signals/{number}": ("comment_signal",),
     "/work-zeros/fixtures/{machine}/{fixture}": ("watch_fixture",),

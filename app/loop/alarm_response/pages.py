@@ -31,10 +31,10 @@ def board(
     done: Number = None,
     late: Number = None,
 ) -> Response:
-    """Active alarms, oldest first; below them the alarms acknowledged last, with the consequences."""
+    """Active alarms, the most urgent first; below them the alarms acknowledged last, with the consequences."""
     machine_row = machines.machine_named(session, machine) if machine else None
     machine_id = machine_row.id if machine_row else None
-    rows = queries.alarms(session, state="active", machine_id=machine_id, limit=MOST_ON_BOARD)
+    rows = queries.alarms(session, state="active", machine_id=machine_id, limit=MOST_ON_BOARD, by_urgency=True)
     by_machine = queries.active_by_machine(session)
     return page(
         request,

@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from typing import Literal, NamedTuple
 
-from sqlalchemy import Select, any_, exists, func, literal, select
+from sqlalchemy import Select, any_, case, exists, func, literal, select
 from sqlalchemy.orm import Session, aliased
 
 from app.db.text import holds_words
@@ -17,6 +17,7 @@ from app.loop.tables.machines import Machine
 from app.loop.tables.readings import Reading
 from app.loop.tables.tools import OPEN, Correction, Tool
 from app.web.fields import LARGEST_ID
+from app.web.states import URGENCY
 
 AlarmState = Literal["active", "acknowledged", "all"]
 
@@ -80,9 +81,14 @@ def alarms(
     kind: str | None = None,
     after: int = 0,
     limit: int = 100,
+    by_urgency: bool = False,
 ) -> list[AlarmRow]:
-    """Alarms, oldest first."""
-    query = _filtered(state, machine_id).where(Alarm.id > after).order_by(Alarm.id).limit(limit)
+    """Alarms, oldest first; by_urgency: the most urgent first, of those the oldest."""
+    query = _filtered(state, machine_id).where(Alarm.id > after).limit(limit)
+    if by_urgency:
+        places = {kind.name: URGENCY.index(kind.tone) for kind in kinds()}
+        query = query.order_by(case(places, value=Alarm.kind, else_=URGENCY.index("attention")))
+    query = query.order_by(Alarm.id)
     if characteristic is not None:
         query = query.where(Characteristic.key == characteristic)
     if kind is not None:

@@ -5,14 +5,19 @@ from functools import partial
 from typing import Any
 
 from fastapi import APIRouter, Request, Response
+from sqlalchemy.orm import Session
 from starlette.responses import RedirectResponse
 
 from app.access.deps import Admin, require
-from app.loop.connections import actions, queries, wording
+from app.language.times import plant_zone
+from app.loop.characteristics import queries as characteristics
+from app.loop.connections import actions, bridge_text, queries, wording
+from app.loop.connections.bridge_text import Known
 from app.loop.connections.touch_tests.queries import touch_tests
 from app.loop.machines import queries as machines
+from app.loop.tables.machines import Machine
 from app.settings import Settings
-from app.web.deps import SessionDep, Sought, Word
+from app.web.deps import AddressDep, SessionDep, Sought, Word
 from app.web.paging import address, part_of
 from app.web.templates import page
 
@@ -41,20 +46,32 @@ def connections_page(request: Request, session: SessionDep, after: Word = None, 
 
 
 @router.get("/machines/{machine}/connection", dependencies=[require("viewer")])
-def connection_page(request: Request, session: SessionDep, machine: str) -> Response:
-    """The connection of one machine."""
+def connection_page(
+    request: Request, session: SessionDep, address_here: AddressDep, machine: str, kind: Word = None
+) -> Response:
+    """The connection of one machine; of one without a bridge the configuration of one of this kind."""
     chosen = machines.machine_named(session, machine)
+    shown_kind = kind if kind in bridge_text.KINDS else bridge_text.KINDS[0]
     return page(
         request,
         "connections/connection.html",
         machine=chosen,
         machines=machines.machines(session),
         row=queries.find_connection(session, chosen.id),
+        kind=shown_kind,
+        bridge_kinds=bridge_text.kinds(),
+        configuration=bridge_text.configuration(shown_kind, _known(session, chosen, address_here)),
         tests=touch_tests(session, chosen),
         wording=wording,
         silent_after=_silent_after(request),
         moment=_moment,
     )
+
+
+def _known(session: Session, machine: Machine, server: str) -> Known:
+    measured = characteristics.characteristics(session, machine_id=machine.id)
+    tools = {each.parameters.tool_memory for each in measured if not each.parameters.measures_only}
+    return Known(machine.key, server, [each.characteristic.key for each in measured], sorted(tools), plant_zone().key)
 
 
 @router.post("/machines/{machine}/connection/remove")

@@ -183,6 +183,10 @@ class ReadingContextOut(BaseModel):
     operator: Annotated[str | None, Field(description="Who measured.")] = None
     machine: Annotated[str | None, Field(description="The machine that made the part, as the sender calls it.")] = None
     gauge: Annotated[str | None, Field(description="What it was measured with.")] = None
+    by_hand: Annotated[
+        bool | None,
+        Field(description="true: a person measured it with a gauge; the empirical value (R11) is not taken off."),
+    ] = None
     comment: Annotated[str | None, Field(description="Remark.")] = None
     events: Annotated[list[str] | None, Field(description="What happened at the part or before it.")] = None
     process: Annotated[dict[str, float] | None, Field(description="Process parameters by name.")] = None

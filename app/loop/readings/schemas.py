@@ -31,7 +31,7 @@ _Number = Annotated[float, Meta(ge=-1e300, le=1e300)]
 
 
 class Context(Struct, forbid_unknown_fields=True, omit_defaults=True):
-    """The circumstances of a reading. Nothing is decided by them; they are shown and handed on."""
+    """The circumstances of a reading. Nothing but `by_hand` is of account for the decision; they are shown and handed on."""
 
     order: Annotated[_Text | None, Meta(description="Number of the order.")] = None
     batch: Annotated[_Text | None, Meta(description="Batch or charge of the material.")] = None
@@ -41,6 +41,13 @@ class Context(Struct, forbid_unknown_fields=True, omit_defaults=True):
     operator: Annotated[_Text | None, Meta(description="Who measured.")] = None
     machine: Annotated[_Text | None, Meta(description="The machine that made the part, as the sender calls it.")] = None
     gauge: Annotated[_Text | None, Meta(description="What it was measured with.")] = None
+    by_hand: Annotated[
+        bool | None,
+        Meta(
+            description="true: a person measured it with a gauge of their own. The empirical value (R11) is what the machine's "
+            "probe reads too much, so it is not taken off."
+        ),
+    ] = None
     comment: Annotated[_Comment | None, Meta(description="Remark.")] = None
     events: Annotated[
         Annotated[list[_Text], Meta(max_length=MOST_OF_CONTEXT)] | None,
@@ -112,6 +119,11 @@ class ReadingIn(Struct, forbid_unknown_fields=True, gc=False):
     context: Annotated[Context | None, Meta(description="Its circumstances: order, batch, nest, events and more.")] = (
         None
     )
+
+    @property
+    def is_by_hand(self) -> bool:
+        """Tell if a person measured it, with a gauge that does not read what the probe reads too much."""
+        return self.context is not None and bool(self.context.by_hand)
 
 
 FIELDS = ReadingIn.__struct_fields__
@@ -377,6 +389,7 @@ def _short_text() -> str:
 
 _MUST: dict[str, Callable[[], str]] = dict.fromkeys(("order", "batch", "operator", "machine", "gauge"), _short_text) | {
     "nest": lambda: _("a whole number from 0 to 999999"),
+    "by_hand": lambda: _("true or false, without quotes"),
     "comment": lambda: _("a text of 1 to {most} characters").format(most=LONGEST_COMMENT),
     "events": lambda: _("a list of at most {most} texts").format(most=MOST_OF_CONTEXT),
     "process": lambda: _("an object of at most {most} numbers by name").format(most=MOST_OF_CONTEXT),

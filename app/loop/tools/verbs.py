@@ -185,7 +185,8 @@ CORRECTION: tuple[Verb[OfCorrection, Any], ...] = (
         word=lambda: _("Approve"),
         title=lambda _on: _("Approve correction {number}?"),
         follows=lambda on: [_to_machine(on)],
-        reasons=lambda: [_("Part measured, agrees"), _("Process is known"), _("As expected")],
+        reasons=lambda: [_("As expected"), _("Part measured, agrees"), _("Process is known")],
+        likely=lambda: _("As expected"),
         said=lambda: _("Correction {n} is approved; it waits for the machine."),
     ),
     Verb(

@@ -14,7 +14,7 @@ from app.loop.machines.queries import machine_named
 from app.loop.tools import queries, verbs, wording
 from app.quality.what_if import queries as what_if
 from app.views.approvals import queries as queue
-from app.views.approvals.verbs import APPROVE_ALL, OfTool
+from app.views.approvals.verbs import APPROVE_ALL, OfTool, shown_in
 from app.views.characteristic.glance import band_picture
 from app.web.deps import FormDep, Number, SessionDep, Word
 from app.web.paging import address
@@ -70,10 +70,7 @@ def approve_all(
     request: Request, session: SessionDep, caller: Operator, machine: str, tool: int, form: FormDep
 ) -> Response:
     """Approves exactly those that were shown; if one of them was decided about meanwhile, none."""
-    numbers = tuple(
-        int(number) for number in form.get("numbers", "").split() if number.isdecimal() and len(number) < 11
-    )
-    on = OfTool(session, machine_named(session, machine), tool, caller, numbers)
+    on = OfTool(session, machine_named(session, machine), tool, caller, shown_in(form))
     queries.tool(session, on.machine, tool)
     try:
         outcome = carry_out(APPROVE_ALL, on, form)

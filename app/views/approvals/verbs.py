@@ -53,6 +53,11 @@ class OfTool(OfMachine):
         return next(correction for correction in shown if correction.status != "awaiting_approval")
 
 
+def shown_in(form: Mapping[str, str]) -> tuple[int, ...]:
+    """Numbers of the corrections that the question has shown."""
+    return tuple(int(each) for each in form.get("numbers", "").split() if each.isdecimal() and len(each) < 11)
+
+
 def _approve(on: OfTool, decision: DecisionsIn) -> Said:
     actions.approve_all(on.session, on.machine, decision.numbers, decision.reason, on.caller)
     return Said("approve-all", on.number)
@@ -76,7 +81,8 @@ APPROVE_ALL: Verb[OfTool, DecisionsIn] = Verb(
         "Approve {n} correction of tool {tool}?", "Approve {n} corrections of tool {tool}?", len(on.group.approvable)
     ),
     follows=_approving,
-    reasons=lambda: [_("Part measured, agrees"), _("Process is known"), _("As expected")],
+    reasons=lambda: [_("As expected"), _("Part measured, agrees"), _("Process is known")],
+    likely=lambda: _("As expected"),
     hidden=lambda on: {"numbers": " ".join(map(str, on.group.approvable))},
     said=lambda: _("All that awaited approval for tool {n} is approved; it waits for the machine."),
 )

@@ -37,7 +37,7 @@ class NextAction(NamedTuple):
 def next_action(row: CharacteristicRow, machine: str) -> NextAction | None:
     """Return the next action at a characteristic, in words short enough to be read from two metres; None: nothing to do."""
     path = f"/alarms/{row.alarms[0][0]}" if row.alarms else None
-    waiting = next((each for each in reversed(row.corrections) if each[1] == row.state), None)
+    waiting = next((each for each in row.corrections if each[1] == row.state), None)
     if waiting is not None and row.state in WAITING:
         path = path or f"/machines/{machine}/corrections/{waiting[0]}"
     if row.state in _ACTIONS:

@@ -12,10 +12,11 @@ from starlette.responses import RedirectResponse
 from app.access.deps import Caller, Engineer, Viewer, require
 from app.core.fits import fit_of
 from app.core.natural import looks_natural
-from app.core.parameters import BY_NAME
+from app.core.parameters import AVERAGE_LOCATIONS, BY_NAME
 from app.core.plausibility import suggested_jump
 from app.core.variants import forms_of
 from app.errors import Conflict, InbandError, Invalid
+from app.language.i18n import _
 from app.loop.characteristics import actions, queries
 from app.loop.characteristics.actions import CharacteristicChange, CharacteristicIn
 from app.loop.characteristics.wording import history, result_label
@@ -27,6 +28,7 @@ from app.quality.what_if import wording
 from app.views.set_up import parameter_form
 from app.views.set_up.frame import setup_page
 from app.web.deps import FormDep, SessionDep, Sought
+from app.web.fields import slug_of
 from app.web.forms import by_field, parsed
 from app.web.paging import Order, address, part_of
 
@@ -67,7 +69,7 @@ def characteristics_page(
 def new_characteristic_page(
     request: Request, session: SessionDep, caller: Engineer, machine: str = "", like: str = ""
 ) -> Response:
-    typed = parameter_form.typed_defaults() | {"machine": machine}
+    typed = parameter_form.typed_defaults() | {"machine": machine, "tool_memory": "", "average_memory": ""}
     if like:
         current = queries.characteristic_named(session, like)
         typed = parameter_form.typed_from(current.version.parameters) | {
@@ -79,15 +81,28 @@ def new_characteristic_page(
 
 @router.post("/setup/characteristics/new")
 def send_new_characteristic(request: Request, session: SessionDep, caller: Engineer, form: FormDep) -> Response:
-    named = {name: form.get(name, "") for name in ("key", "name", "machine", "part")}
+    named = {name: form.get(name, "").strip() for name in ("key", "name", "machine", "part")}
+    named["key"] = named["key"] or slug_of(named["name"])
+    filled = _with_suggestions(session, form)
     try:
-        new = parsed(CharacteristicIn, named | {"parameters": parameter_form.parameters_from(form)})
+        if not form.get("tool_memory", "").strip():
+            raise Invalid.at("tool_memory", _("enter the tool whose offset is corrected, or 0 to measure only"))
+        new = parsed(CharacteristicIn, named | {"parameters": parameter_form.parameters_from(filled)})
         stored = actions.add_characteristic(session, new, caller.name)
     except InbandError as error:
         if not error.errors:
             raise
-        return _new(request, session, caller, form, _all_errors(error, form), error.status)
+        return _new(request, session, caller, form, _all_errors(error, filled), error.status)
     return RedirectResponse(f"/setup/characteristics/{stored.characteristic.key}?done=added", 303)
+
+
+def _with_suggestions(session: Session, form: Mapping[str, str]) -> dict[str, str]:
+    machine = machines.find_machine(session, form.get("machine", ""))
+    if machine is None:
+        return parameter_form.with_suggestions(form, 0.0, (), AVERAGE_LOCATIONS)
+    there = queries.characteristics(session, machine_id=machine.id)
+    used = {each.parameters.average_memory for each in there}
+    return parameter_form.with_suggestions(form, machine.zero_range_floor, used, machine.average_locations)
 
 
 def _all_errors(error: InbandError, form: Mapping[str, str]) -> dict[str, str]:
@@ -237,6 +252,7 @@ def _characteristic(
         characteristic=characteristic,
         machine=current.machine,
         version=current.version,
+        in_force_measures_only=current.parameters.measures_only,
         problem=problem,
         warnings=actions.warnings_of(current, queries.target_before(session, current)),
         history=history(queries.versions(session, characteristic)),

@@ -19,6 +19,7 @@ from app.loop.machines import actions, keys, queries
 from app.loop.machines.actions import MAY_BE_NOTHING, MachineChange, MachineIn
 from app.views.set_up.frame import setup_page
 from app.web.deps import AddressDep, FormDep, SessionDep
+from app.web.fields import slug_of
 from app.web.forms import by_field, length, parsed, whole
 
 router = APIRouter(include_in_schema=False)
@@ -97,6 +98,7 @@ def new_machine_page(request: Request, session: SessionDep, caller: Engineer, li
 def send_new_machine(request: Request, session: SessionDep, caller: Engineer, form: FormDep) -> Response:
     try:
         typed = {name: text for name, text in form.items() if name not in {"like", "characteristics"}}
+        typed["key"] = typed.get("key", "").strip() or slug_of(typed.get("name", ""))
         given = parsed(MachineIn, {**typed, **_counts(form)})
         if like := form.get("like"):
             keys = many_actions.copied_keys(form.get("characteristics", ""))

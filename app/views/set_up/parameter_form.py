@@ -3,7 +3,7 @@
 What people type stays text until the core has looked at it, so that nothing typed is lost when something is refused.
 """
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from typing import Any, NamedTuple
 
 from app.core.fits import fit_of
@@ -11,6 +11,7 @@ from app.core.natural import NaturalLimit, assumed, half_width
 from app.core.number_text import number_or_none, plain
 from app.core.parameters import BY_NAME, FIELDS, Field, FieldKind, default_averaging_limit, mean_nominal
 from app.core.programs.lines import written
+from app.core.suggested import suggested_limits
 from app.language.i18n import _
 from app.language.numbers import short, um_limit
 from app.loop.characteristics.wording import choice, explanation, label, order_sentence
@@ -145,6 +146,25 @@ def parameters_from(form: Mapping[str, str]) -> dict[str, Any]:
         parameters["factor"] = number(form.get("factor_other", ""))
     parameters["accept"] = {"n": number(form.get("accept_n", "")), "m": number(form.get("accept_m", ""))}
     return parameters
+
+
+def with_suggestions(
+    form: Mapping[str, str], floor: float, averages_used: Collection[int], average_locations: int
+) -> dict[str, str]:
+    """A new form with what was left empty filled in: R33, R36, R37 from the tolerance, R11 the first free location.
+
+    floor: uncertainty of the machine's signal path, mm. A tool that was not named is not suggested: it is asked for.
+    """
+    given = dict(form)
+    half = diagram(form).limits["tolerance"]
+    if half is not None and half > 0:
+        for name, value in suggested_limits(half, floor)._asdict().items():
+            given[name] = form.get(name, "").strip() or f"{value:.10g}"
+    if not form.get("average_memory", "").strip():
+        free = (n for n in range(1, average_locations + 1) if n not in averages_used)
+        measures_only = form.get("tool_memory", "").strip() in ("", "0") or form.get("mode") == "measure_only"
+        given["average_memory"] = "0" if measures_only else str(next(free, 0))
+    return given
 
 
 def number(text: str) -> float | int | str | None:

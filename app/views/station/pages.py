@@ -12,12 +12,10 @@ from starlette.responses import RedirectResponse
 
 from app.access import devices
 from app.access import queries as access
-from app.access.audit.actions import acts
 from app.access.deps import AtStation, Caller, Station
-from app.access.identification import LONGEST_PIN, NotIdentified, Shown, identify
 from app.access.new_keys import digest
 from app.access.sign_in import sign_out
-from app.errors import Conflict, InbandError, Invalid, NotAllowed, NotFound, TooManyRequests
+from app.errors import Conflict, InbandError, Invalid, NotFound
 from app.language.i18n import _
 from app.loop.alarm_response import queries as alarms
 from app.loop.alarm_response import verbs as alarm_verbs
@@ -32,11 +30,13 @@ from app.loop.tools import verbs
 from app.loop.tools.verbs import CHANGE, OfCorrection, OfTool
 from app.quality.wear.queries import next_event
 from app.settings import Settings
-from app.views.approvals.queries import DECIDED_BY_PEOPLE
+from app.views.approvals.verbs import APPROVE_ALL, shown_in
+from app.views.approvals.verbs import OfTool as Together
 from app.views.characteristic.glance import band_picture
 from app.views.characteristic.wording import state_word
-from app.views.station import queries
-from app.views.station.wording import next_action
+from app.views.station import queries, sheet_pages
+from app.views.station.who import REFUSED, asked, who
+from app.views.station.wording import first_sentence, next_action
 from app.web.deps import SESSION_COOKIE, STATION_COOKIE, FormDep, Number, SessionDep, SettingsDep, Word, from_this_site
 from app.web.fields import LARGEST_ID
 from app.web.forms import by_field
@@ -44,12 +44,11 @@ from app.web.limits import FEW, takes
 from app.web.live import Access, stream
 from app.web.paging import address
 from app.web.templates import page
-from app.web.verb import Verb, carry_out, named
+from app.web.verb import Verb, carry_out, named, said
 
 router = APIRouter(prefix="/station", include_in_schema=False)
+router.routes += sheet_pages.router.routes
 NO_FORM: Mapping[str, str] = {}
-REFUSED = (Invalid, NotIdentified, NotAllowed, TooManyRequests)
-"""After these the same is asked again, with what was typed."""
 NOBODY = Caller("person", "")
 """Asks the question; who acts is asked with it."""
 
@@ -127,7 +126,7 @@ def station_page(
         done=_of_machine(session, station.machine.key, done) if done else None,
         late=_of_machine(session, station.machine.key, late) if late else None,
         tool=verbs.done("change", tool) if tool else None,
-        said=verbs.done(decided, n) if decided and n else None,
+        said=said((APPROVE_ALL,), decided, n) or verbs.done(decided, n) if decided and n else None,
         refused=verbs.too_late(session, station.machine, too_late, n) if too_late and n else None,
         written=_beginning_of(session, station.machine.key, note) if note else None,
         offered=verbs.offered,
@@ -139,6 +138,7 @@ def station_page(
             None,
             None if row.stream.last_deviation is None else row.average,  # a mark on the target would pass for a reading
         ),
+        first_sentence=first_sentence,
         next_event=lambda row: next_event(row.outlook),
         wording=alarm_wording,
         outcomes=outcomes,
@@ -184,7 +184,7 @@ def _ask_alarm(
         machine=row.machine,
         row=row,
         action=action,
-        **_asked(session, at, form, error),
+        **asked(session, at, form, error),
         wording=alarm_wording,
         address=address,
     )
@@ -197,7 +197,7 @@ def acknowledge(
     """Acknowledge the alarm. Sent twice, or after somebody else, it changes nothing and says so."""
     row = _of_machine(session, machine, number)
     try:
-        outcome = alarm_verbs.acknowledge(session, number, form, _who(request, session, at, form))
+        outcome = alarm_verbs.acknowledge(session, number, form, who(request, session, at, form))
     except REFUSED as error:
         return _ask_alarm(request, session, at, row, form.get("action", ""), form, error)
     return RedirectResponse(address(f"/station/{machine}", **{outcome.kind: number}), 303)
@@ -217,10 +217,32 @@ def change_tool(
     """Say that the tool was changed."""
     on = OfTool(session, machine_named(session, machine), number, NOBODY)
     try:
-        carry_out(CHANGE, replace(on, caller=_who(request, session, at, form)), form)
+        carry_out(CHANGE, replace(on, caller=who(request, session, at, form)), form)
     except REFUSED as error:
         return _ask(request, at, CHANGE, on, form, error)
     return RedirectResponse(address(f"/station/{machine}", tool=number), 303)
+
+
+@router.get("/{machine}/tools/{number}/corrections")
+def ask_all(request: Request, session: SessionDep, at: Station, machine: str, number: int) -> Response:
+    """The second touch before all that awaits approval for one tool is approved."""
+    at.must_act()
+    return _ask(request, at, APPROVE_ALL, Together(session, machine_named(session, machine), number, NOBODY))
+
+
+@router.post("/{machine}/tools/{number}/corrections")
+def approve_all(
+    request: Request, session: SessionDep, at: Station, machine: str, number: int, form: FormDep
+) -> Response:
+    """Approve exactly those that were shown; if one of them was decided about meanwhile, none."""
+    on = Together(session, machine_named(session, machine), number, NOBODY, shown_in(form))
+    try:
+        outcome = carry_out(APPROVE_ALL, replace(on, caller=who(request, session, at, form)), form)
+    except REFUSED as error:
+        return _ask(request, at, APPROVE_ALL, on, form, error)
+    if outcome.kind == "late":
+        return RedirectResponse(address(f"/station/{machine}", too_late="approve", n=on.decided.number), 303)
+    return RedirectResponse(address(f"/station/{machine}", decided=APPROVE_ALL.name, n=number), 303)
 
 
 @router.get("/{machine}/corrections/{number}")
@@ -232,7 +254,7 @@ def ask_correction(
     number: int,
     do: Annotated[str, Query(max_length=40)] = "",
 ) -> Response:
-    """The second touch at a correction that waits for a decision. One that is decided meanwhile leads back."""
+    """The second touch at a correction that waits for a person, or for its place in the control. One that does not leads back."""
     at.must_act()
     return _ask_correction(request, at, OfCorrection(session, machine_named(session, machine), number, NOBODY), do)
 
@@ -246,7 +268,7 @@ def _ask_correction(
     error: InbandError | None = None,
 ) -> Response:
     status = on.row.correction.status
-    if status not in DECIDED_BY_PEOPLE:
+    if not verbs.offered(status):
         back = address(f"/station/{on.machine.key}", too_late=name or "approve", n=on.number)
         return RedirectResponse(back, 303)
     return _ask(
@@ -261,11 +283,11 @@ def _ask_correction(
 
 @router.post("/{machine}/corrections/{number}")
 def decide(request: Request, session: SessionDep, at: Station, machine: str, number: int, form: FormDep) -> Response:
-    """Approve, release or reject a correction. Somebody who comes too late sees the state now."""
+    """Approve, release or reject a correction, or say that it is in the control. Somebody who comes too late sees the state now."""
     on = OfCorrection(session, machine_named(session, machine), number, NOBODY)
     verb = named(verbs.CORRECTION, form.get("do", ""), on, _("Go back to the station of the machine."))
     try:
-        outcome = carry_out(verb, replace(on, caller=_who(request, session, at, form)), form)
+        outcome = carry_out(verb, replace(on, caller=who(request, session, at, form)), form)
     except REFUSED as error:
         return _ask_correction(request, at, on, verb.name, form, error)
     if outcome.kind == "ask":
@@ -278,18 +300,20 @@ def _ask(
     request: Request,
     at: AtStation,
     verb: Verb[Any, Any],
-    on: OfTool | OfCorrection,
+    on: OfTool | OfCorrection | Together,
     form: Mapping[str, str] = NO_FORM,
     error: InbandError | None = None,
 ) -> Response:
-    where = f"tools/{on.number}/change" if isinstance(on, OfTool) else f"corrections/{on.number}"
+    where = {OfTool: f"tools/{on.number}/change", Together: f"tools/{on.number}/corrections"}.get(
+        type(on), f"corrections/{on.number}"
+    )
     return page(
         request,
         "station/ask.html",
         status=error.status if error else 200,
         machine=on.machine,
         question=verb.question(on, f"/station/{on.machine.key}/{where}"),
-        **_asked(on.session, at, form, error),
+        **asked(on.session, at, form, error),
     )
 
 
@@ -314,7 +338,7 @@ def _ask_note(
         status=error.status if error else 200,
         machine=machine_named(session, key),
         key=token_hex(8),
-        **_asked(session, at, form, error),
+        **asked(session, at, form, error),
     )
 
 
@@ -323,43 +347,10 @@ def write_note(request: Request, session: SessionDep, at: Station, machine: str,
     """Write a note at the machine; sent twice, it is one."""
     written = {"machine": machine, "text": form.get("text", ""), "key": form.get("key", "")}
     try:
-        row = write_as_typed(session, written, _who(request, session, at, form))
+        row = write_as_typed(session, written, who(request, session, at, form))
     except (*REFUSED, Conflict) as error:
         return _ask_note(request, session, at, machine, form, error)
     return RedirectResponse(address(f"/station/{machine}", note=row.note.id), 303)
-
-
-def _who(request: Request, session: Session, at: AtStation, form: Mapping[str, str]) -> Caller:
-    """The person who acts: signed in, or identified on the device for this one action.
-
-    Raises `NotIdentified`, `TooManyRequests`, and `NotAllowed` for a person without the role operator.
-    """
-    if at.device is None:
-        assert at.caller is not None
-        at.caller.must("operator")
-        return at.caller
-    name = form.get("other_name", "").strip() or form.get("who", "")
-    shown = Shown(name, form.get("pin", ""), form.get("badge", "").strip())
-    session.commit()  # its connection is given back: identification has transactions of its own
-    caller = identify(request.app.state.database, at.device, shown)
-    caller.must("operator")
-    acts(caller.person_id, None, at.device.id)
-    return caller
-
-
-def _asked(session: Session, at: AtStation, form: Mapping[str, str], error: InbandError | None) -> dict[str, Any]:
-    """Content of every second touch: what was typed, what was wrong, and on a device the question who acts."""
-    errors: dict[str, str] = {}
-    if error is not None:
-        errors = by_field(error) or {"who": f"{error.detail} {error.advice}".strip()}
-    return {
-        "form": form,
-        "errors": errors,
-        "refusal": error,
-        "asks_who": at.device is not None,
-        "people": devices.people_at(session, at.device.id) if at.device else [],
-        "longest": LONGEST_PIN,
-    }
 
 
 @router.get("/{machine}/events")

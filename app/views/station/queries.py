@@ -10,7 +10,7 @@ from app.loop.alarm_response import queries as alarms
 from app.loop.alarm_response.queries import AlarmRow
 from app.loop.tables.machines import Machine
 from app.views.approvals import queries as approvals
-from app.views.approvals.queries import Waiting
+from app.views.approvals.queries import Group, Waiting
 from app.views.characteristic import state_queries
 from app.views.characteristic.state_queries import CharacteristicRow
 
@@ -19,10 +19,10 @@ URGENCY = {state: place for place, state in enumerate(CharacteristicState)}
 
 
 class Station(NamedTuple):
-    """Content of the station of a machine: `first` in giant digits, the `others` small; active alarms, the first one first.
+    """Content of the station of a machine: `first` in giant digits, the `others` small; active alarms, the most urgent first.
 
     tools: the tools that its characteristics are cut with. waiting: corrections to decide about that no active alarm holds,
-    the newest first, as `first` names it.
+    the oldest first; together: of the tools of which several await approval, what approving all of them comes to.
     """
 
     machine: Machine
@@ -32,6 +32,7 @@ class Station(NamedTuple):
     active: int
     tools: Sequence[int]
     waiting: Sequence[Waiting]
+    together: Sequence[Group]
 
 
 def station(session: Session, machine: str) -> Station:
@@ -39,19 +40,20 @@ def station(session: Session, machine: str) -> Station:
     (group,) = state_queries.plant(session, machine=machine, trends=False)
     rows = sorted(group.rows, key=_place)
     first = rows[0] if rows else None
-    active = alarms.alarms(session, state="active", machine_id=group.machine.id, limit=MOST_ALARMS)
-    number = first.characteristic.id if first else None
+    active = alarms.alarms(session, state="active", machine_id=group.machine.id, limit=MOST_ALARMS, by_urgency=True)
+    waiting = approvals.groups(session, group.machine)
     return Station(
         group.machine,
         first,
         rows[1:],
-        sorted(active, key=lambda row: row.alarm.characteristic_id != number),
+        active,
         alarms.active_count(session, group.machine.id),
         sorted({row.parameters.tool_memory for row in rows if row.parameters.tool_memory}),
         sorted(
-            (each for tool in approvals.groups(session, group.machine) for each in tool.waiting if each.alarm is None),
-            key=lambda each: -each.row.correction.number,
+            (each for tool in waiting for each in tool.waiting if each.alarm is None),
+            key=lambda each: each.row.correction.number,
         ),
+        [tool for tool in waiting if len(tool.approvable) > 1],
     )
 
 

@@ -90,7 +90,7 @@ def count_by_machine(session: Session) -> dict[int, int]:
 
 
 def tasks(session: Session, machine: Machine | None = None, caller: Caller | None = None) -> list[Task]:
-    """All that waits, alarms first, each kind with the oldest first: at one machine, or what one person's role may do."""
+    """All that waits, alarms first, the most urgent of them, then the oldest of each kind: at one machine, or what one person's role may do."""
     found = [*_alarms(session, machine), *_corrections(session, machine), *_proposals(session, machine)]
     if machine is None:
         found += _jobs(session)
@@ -98,7 +98,9 @@ def tasks(session: Session, machine: Machine | None = None, caller: Caller | Non
 
 
 def _alarms(session: Session, machine: Machine | None) -> Iterator[Task]:
-    rows = alarms.alarms(session, state="active", machine_id=machine.id if machine else None, limit=MOST)
+    rows = alarms.alarms(
+        session, state="active", machine_id=machine.id if machine else None, limit=MOST, by_urgency=True
+    )
     for row in rows:
         alarm = row.alarm
         about = row.characteristic.name if row.characteristic else ""

@@ -6,6 +6,9 @@
 //   on    see live.js
 //   now   fetch at once, too
 //   every seconds between two looks where no event tells of a change
+//   still the items of a list that is worked with fingers, as a selector: while somebody is near (moves or touches something in
+//         it, within two seconds), nothing is swapped, and how many items are new is said ("1 new", data-new="{n} new"; a touch
+//         shows them). Where a swap has moved the items, a touch counts only when they have stood still for a moment
 //
 // What the reader is doing is kept: focus, selection, opened <details> (those with an id or data-key), scrolling.
 // While he types in it, presses something in it or has a dialog or a popover of it open, it waits. If fetching fails it says so and how
@@ -16,6 +19,8 @@ import { coalesced } from "./coalesce.js";
 import { afterEvent, subscribe } from "./live.js";
 import { age } from "./times.js";
 
+const NEAR = 2_000; // ms after the last movement
+const SETTLED = 500; // ms after a swap; a finger that was on its way meant what stood there before
 const PRESS = 1_500; // ms from the first touch on; what is swapped between press and release would never be clicked
 
 const key = (element) => element.id || element.dataset.key || element.name || "";
@@ -26,6 +31,7 @@ class LivePart extends HTMLElement {
   connectedCallback() {
     this.fetched = Date.now();
     this.addEventListener("pointerdown", this.onPress ??= () => (this.pressed = performance.now()), true);
+    if (this.hasAttribute("still")) this.watch();
     this.refresh = coalesced(() => this.load());
     this.stop = subscribe(this.getAttribute("on"), () => this.refresh());
     if (this.hasAttribute("now")) this.refresh();
@@ -36,6 +42,51 @@ class LivePart extends HTMLElement {
   disconnectedCallback() {
     this.stop?.();
     clearInterval(this.timer);
+  }
+
+  /** Once: notes movements of fingers, mouse and wheel. */
+  watch() {
+    if (this.watching) return;
+    this.watching = true;
+    for (const type of ["pointermove", "pointerdown", "wheel", "keydown"])
+      this.addEventListener(type, () => (this.moved = performance.now()), { capture: true, passive: true });
+  }
+
+  /** Keeps touches off what has just moved there (pointer-events in components.css). */
+  settle() {
+    this.setAttribute("settling", "");
+    clearTimeout(this.settled);
+    this.settled = setTimeout(() => this.removeAttribute("settling"), SETTLED);
+  }
+
+  get near() {
+    return performance.now() - this.moved < NEAR && !this.wanted;
+  }
+
+  items(root) {
+    const name = (item) => item.id || item.getAttribute("aria-labelledby");
+    return this.hasAttribute("still") ? [...root.querySelectorAll(this.getAttribute("still"))].map(name) : [];
+  }
+
+  /** Says how many items wait to be shown. */
+  announce(fresh) {
+    const here = new Set(this.items(this));
+    const count = this.items(fresh).filter((item) => !here.has(item)).length;
+    if (!count) return void this.querySelector(".still-news")?.remove();
+    let news = this.querySelector(".still-news");
+    if (!news) {
+      news = Object.assign(document.createElement("div"), { className: "still-news" });
+      news.setAttribute("role", "status");
+      const button = Object.assign(document.createElement("button"), { type: "button", className: "button primary big" });
+      button.addEventListener("click", () => {
+        [this.wanted, this.pressed] = [true, undefined];
+        this.refresh();
+      });
+      news.append(button);
+      this.append(news);
+    }
+    const words = this.dataset.new.replace("{n}", count);
+    if (news.textContent !== words) news.firstChild.textContent = words;
   }
 
   get busy() {
@@ -55,7 +106,16 @@ class LivePart extends HTMLElement {
       if (!answer.ok) throw new Error(`${answer.status}`);
       const page = new DOMParser().parseFromString(await answer.text(), "text/html");
       if (this.busy) return void this.refresh();
-      this.swap((this.id && page.getElementById(this.id)) || page.body);
+      const fresh = (this.id && page.getElementById(this.id)) || page.body;
+      if (this.near) {
+        this.announce(fresh);
+        return void setTimeout(() => this.isConnected && this.refresh(), 1_000);
+      }
+      const before = this.items(this).join();
+      const after = this.items(fresh).join();
+      this.swap(fresh);
+      if (before !== after) this.settle();
+      this.wanted = false;
       this.fetched = Date.now();
       this.removeAttribute("stale");
       this.removeAttribute("title");

@@ -4,6 +4,7 @@
 //   – writes deviation and size at each limit, target and width (L75), and the µm beside each length ([data-um]);
 //   – writes a tolerance class typed with the nominal size, 40 h6, as nominal and deviations once the field is left;
 //   – fills in 0 and the natural limit for a name such as Run-out, where nothing is typed yet and no tool is corrected;
+//   – shows what an empty limit of a new characteristic takes (form[data-suggests]);
 //   – marks a limit that breaks R33 < R34 ≤ R35/2 ≤ R37 ≤ R36, and says why at the field, in the server's own sentences.
 // The server checks the same again when the form is sent; without this script nothing is lost but the immediacy.
 
@@ -89,9 +90,20 @@ customElements.define("zone-diagram", class extends HTMLElement {
       tolerance: usable(width) ? half : null,
       averaging_limit: values.averaging_limit ?? (usable(width) ? (half * 2) / 3 : null),
     };
+    if ("suggests" in this.form.dataset && usable(half) && half > 0) this.suggest(values, limits, half);
     this.form.elements.averaging_limit.placeholder = usable(width) && width > 0 ? plain((half * 2) / 3) : "";
     this.write(target, width, limits, natural);
     this.explain(values, limits, natural);
+  }
+
+  /** What an empty field of a new characteristic takes, as `app/core/suggested.py` has it; the signal path may ask for more. */
+  suggest(values, limits, half) {
+    const wear = Math.max(0.3, half);
+    const suggested = { zero_range: Math.min(Math.max(0.001, half / 10), half / 3), wear_limit: wear, confidence_limit: Math.max(1, wear) };
+    for (const [name, value] of Object.entries(suggested)) {
+      this.form.elements[name].placeholder = plain(value);
+      limits[name] = values[name] ?? value;
+    }
   }
 
   /** The side of the natural limit; where none is chosen as the server has it: 0 at best, no minus, nothing corrected. */

@@ -15,11 +15,11 @@ def kinds(text: str) -> list[str]:
 
 
 class TestWithoutScripts:
-    def test_the_oldest_is_first_and_says_what_is_wrong(self, shop: Shop, operator: Person) -> None:
+    def test_the_most_urgent_is_first_and_says_what_is_wrong(self, shop: Shop, operator: Person) -> None:
         shop.read(20.0)
         shop.read(350.0)
         text = operator.open(f"/alarms?machine={shop.machine}")
-        assert kinds(text) == ["Oversize", "Tool worn"]
+        assert kinds(text) == ["Tool worn", "Oversize"]
         assert "deviation +20.0" in text
         assert "tool 3 is worn" in text
         assert '−330.0<span class="unit">µm' in text  # the held correction: 20 µm are on their way already

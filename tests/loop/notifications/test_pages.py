@@ -110,7 +110,7 @@ def test_the_secret_of_a_webhook_is_shown_once(shop: Shop, admin: Person) -> Non
         "events-tool": "true",
     }
     text = admin.send("/setup/notifications/receivers", **fields)
-    (secret,) = re.findall(r'<p class="secret"><code>([\w-]{43})</code>', text)
+    (secret,) = re.findall(r'<code id="webhook-secret">([\w-]{43})</code>', text)
     assert secret not in admin.open("/setup/notifications")
     made = receiver_named(shop, name)
     assert made["events"] == ["tool"]

@@ -80,7 +80,7 @@ class TestQueue:
     def test_bad_forms(self, shop: Shop, operator: Person, server: Any) -> None:
         (first,) = awaiting(shop, 20.0)
         path = f"/corrections/{shop.machine}/tools/4"
-        assert "Is missing" in operator.send(path, 422, numbers=str(first), reason="")
+        assert "Pick a reason" in operator.send(path, 422, numbers=str(first), reason="")
         operator.send(path, 422, numbers="", reason="x")
         operator.send(path, 404, numbers="99999", reason="x")
         operator.send(path, 422, numbers="-1 x 9999999999999999999", reason="x")

@@ -197,6 +197,7 @@ def test_an_empty_plant_leads_to_set_up(run_server: RunServer) -> None:
         text = Person(empty, "viewer").open("/")
     assert "No machine is set up yet" in text
     assert "/setup/machines/new" in text
+    assert "inband demo --port" in text
 
 
 class TestWithoutConnection:

@@ -28,6 +28,8 @@ def test_the_diagram_follows_the_typing(signed_in: Page) -> None:
     page.fill("[name=lower_deviation]", "−0,016")
     assert page.locator('[data-size="target"]').text_content() == "39.9920 mm"
     assert limit(page, "tolerance") == "+8 µm"
+    suggested = [limit(page, name) for name in ("zero_range", "wear_limit", "confidence_limit")]
+    assert suggested == ["+1 µm", "+300 µm", "+1 mm"]
     assert limit(page, "tolerance", -1) == "−8 µm"
     assert limit(page, "averaging_limit") == "+5.333 µm", "a third of the tolerance while the field is empty"
     page.fill("[name=averaging_limit]", "0.0053")
@@ -107,11 +109,9 @@ def test_a_refused_order_is_told_at_once_in_the_words_of_the_server(
 def test_a_machine_and_its_key_by_keyboard_alone(signed_in: Page) -> None:
     page = signed_in
     page.goto("/setup/machines/new")
-    expect(page.locator("[name=key]")).to_be_focused()
+    expect(page.locator("[name=name]")).to_be_focused()
     key = unique("by-keyboard")
-    page.keyboard.type(key)
-    page.keyboard.press("Tab")
-    page.keyboard.type("By keyboard")
+    page.keyboard.type(key.replace("-", " ").capitalize())  # the key follows from the name
     page.keyboard.press("Enter")
     page.wait_for_url(f"**/setup/machines/{key}?done=added")
     page.locator("#f-key-name").focus()

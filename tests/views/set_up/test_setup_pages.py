@@ -149,8 +149,33 @@ class TestCharacteristics:
         shop.call("GET", "/characteristics/refused", 404)
 
     def test_names_and_parameters_are_told_at_once(self, engineer: Person, shop: Shop) -> None:
-        page = self.new(engineer, shop, "No Key", 422, machine="", zero_range="").text
+        page = self.new(engineer, shop, "No Key", 422, machine="", zero_range="0.1").text
         assert len(errors(page)) == 3
+
+    def test_what_is_left_empty_is_suggested_and_the_loop_acts(self, engineer: Person, shop: Shop) -> None:
+        """Name, drawing, tool and sign are enough; after them the first size that is off leads to a correction."""
+        shop.call("PATCH", f"/machines/{shop.machine}", signal_path="plc", probing_feed=600.0)
+        left = dict.fromkeys(("zero_range", "wear_limit", "confidence_limit", "average_memory"), "")
+        name = unique("Seat Ø40 h6").replace("-", " ")
+        made = engineer.post(
+            "/setup/characteristics/new",
+            **(FORM | left | {"key": "", "name": name, "machine": shop.machine, "part": ""}),
+        )
+        key = made.headers["location"].removeprefix("/setup/characteristics/").removesuffix("?done=added")
+        assert key == name.lower().replace("ø", "d").replace(" ", "-")
+        parameters = shop.call("GET", f"/characteristics/{key}")["parameters"]
+        expected = {"zero_range": 0.0025, "averaging_limit": 0.005333333, "wear_limit": 0.3, "confidence_limit": 1.0}
+        assert parameters.items() >= (expected | {"average_memory": 1, "tool_memory": 3, "mode": "automatic"}).items()
+        assert "It measures only" not in engineer.open(f"/setup/characteristics/{key}")
+        assert shop.call("POST", "/readings", 201, characteristic=key, measured=39.999)["action"] == "correct"
+
+    def test_a_tool_is_asked_for_or_said_to_be_none(self, engineer: Person, shop: Shop) -> None:
+        page = self.new(engineer, shop, unique("asked"), 422, tool_memory="").text
+        assert "Enter the tool whose offset is corrected, or 0 to measure only" in errors(page)[0]
+        key = unique("measures")
+        self.new(engineer, shop, key, tool_memory="0", average_memory="")
+        assert "It measures only" in engineer.open(f"/setup/characteristics/{key}")
+        assert shop.call("GET", f"/characteristics/{key}")["parameters"]["average_memory"] == 0
 
     def test_a_list_of_very_many_goes_on_on_another_page(self, engineer: Person, server: Server, shop: Shop) -> None:
         keys = [f"{shop.machine}-{number:03}" for number in range(201)]
@@ -232,6 +257,26 @@ class TestCharacteristics:
     def test_nonsense_is_answered_in_words(self, engineer: Person, shop: Shop, form: dict[str, str]) -> None:
         answer = engineer.post(f"/setup/characteristics/{shop.characteristic}", 422, **form)
         assert answer.headers["content-type"].startswith("text/html")
+
+
+def test_from_a_name_to_the_first_correction_in_three_forms(engineer: Person, shop: Shop) -> None:
+    """The newcomer's path, in the browser alone: a machine, a characteristic, a size typed by hand, a correction to enter."""
+    name = unique("First lathe").replace("-", " ")
+    machine = name.lower().replace(" ", "-")
+    counts = {"tool_locations": "32", "average_locations": "20"}
+    engineer.post("/setup/machines/new", name=name, key="", control="sinumerik", type="lathe", **counts)
+    typed = {"nominal": "25 h6", "tool_memory": "1", "factor": "-1", "mode": "automatic"}
+    defaults = dict.fromkeys(("zero_range", "wear_limit", "confidence_limit", "average_memory", "key", "part"), "")
+    new = FORM | dict.fromkeys(("upper_deviation", "lower_deviation"), "") | defaults | typed
+    made = engineer.post("/setup/characteristics/new", **(new | {"name": f"{name} Ø25", "machine": machine}))
+    assert "sizes?characteristic=" in engineer.open(made.headers["location"])
+    sheet = engineer.open(f"/station/{machine}/sizes?characteristic={machine}-d25")
+    assert f'name="size:{machine}-d25"' in sheet
+    (key,) = re.findall(r'name="key" value="([0-9a-f]{16})"', sheet)
+    said = engineer.send(f"/station/{machine}/sizes", **{"key": key, f"size:{machine}-d25": "24,9995"})
+    assert "Mark applied" in said
+    correction = shop.call("GET", f"/machines/{machine}/corrections?status=pending")["items"][0]
+    assert correction["amount"] == -0.006
 
 
 def test_the_record_of_changes(engineer: Person, viewer: Person, shop: Shop) -> None:

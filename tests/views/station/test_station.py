@@ -6,6 +6,7 @@ from typing import Any
 import pytest
 from playwright.sync_api import Page, expect
 
+from app.language.numbers import um
 from tests.pages.looks import boxes
 from tests.shop import Person, Shop
 
@@ -69,6 +70,39 @@ class TestWithoutScripts:
         assert "had been decided meanwhile" in operator.send(
             f"{here}/corrections/{second}", do="approve", reason="As expected"
         )
+
+    def test_corrections_stand_oldest_first_and_are_approved_together(self, shop: Shop, operator: Person) -> None:
+        key = f"{shop.characteristic}-approval"
+        shop.add(key, mode="approval", tool_memory=4, average_memory=6)
+        first, second, third = (shop.read(each, key)["correction"]["number"] for each in (6.0, 3.7, 12.0))
+        here = f"/station/{shop.machine}"
+        text = operator.open(here)
+        assert text.index(f"{here}/corrections/{first}?") < text.index(f"{here}/corrections/{second}?")
+        assert f"{here}/corrections/{third}?" not in text
+        assert "1 more correction waits" in text
+        total = sum(shop.correction(number)["amount"] for number in (first, second, third))
+        assert f"Approve all 3, {um(total)}" in text
+        asked = operator.open(f"{here}/tools/4/corrections")
+        assert 'value="As expected" checked' in asked
+        later = shop.read(-6.0, key)["correction"]["number"]
+        said = operator.send(
+            f"{here}/tools/4/corrections", numbers=f"{first} {second} {third}", reason="As expected", do="approve-all"
+        )
+        assert "All that awaited approval for tool 4 is approved" in said
+        states = [shop.correction(number)["status"] for number in (first, second, third, later)]
+        assert states == ["pending", "pending", "pending", "awaiting_approval"], "only those that were shown"
+
+    def test_alarms_stand_by_urgency_then_by_age(self, shop: Shop, operator: Person) -> None:
+        for kind, (deviation, tool) in {"large": (12.5, 4), "worn": (350.0, 6), "fault": (1200.0, 8)}.items():
+            shop.add(f"{shop.characteristic}-{kind}", tool_memory=tool, average_memory=tool)
+            shop.read(deviation, f"{shop.characteristic}-{kind}")
+        for path in (f"/alarms?machine={shop.machine}", f"/todo?machine={shop.machine}"):
+            text = operator.open(path)
+            places = [text.index(f"Seat {shop.characteristic}-{kind}") for kind in ("fault", "worn", "large")]
+            assert places == sorted(places), path
+        text = operator.open(f"/station/{shop.machine}")
+        assert text.index("Probe fault</h2>") < text.index("Tool worn</h2>")
+        assert "1 more alarm<" in text
 
     def test_an_alarm_is_acknowledged_in_the_name_of_who_is_signed_in(self, shop: Shop, operator: Person) -> None:
         shop.read(12.0)
@@ -182,6 +216,29 @@ def test_by_touch_live_with_two_touches(page: Page, shop: Shop, operator: Person
     page.get_by_role("dialog").get_by_role("button", name="Noted").click()
     expect(page.get_by_role("status").filter(has_text="Oversize: Noted")).to_be_visible()
     assert shop.alarms("acknowledged")[0]["acknowledged_by"] == operator.name
+
+
+def test_nothing_moves_under_a_finger_and_news_is_announced(page: Page, shop: Shop, operator: Person) -> None:
+    """A more urgent alarm comes while a hand is at the list: it is announced, and shown at a touch."""
+    page.set_viewport_size(UPRIGHT)
+    shop.read(12.5)
+    operator.sign_in(page)
+    page.goto(f"/station/{shop.machine}")
+    expect(page.locator("live-status")).to_have_attribute("state", "live")
+    page.evaluate(
+        """() => {
+          const part = document.getElementById("station");
+          window.hand = setInterval(() => part.dispatchEvent(new PointerEvent("pointermove", { bubbles: true })), 100);
+        }"""
+    )
+    other = shop.another("worn", tool_memory=4, average_memory=6)
+    shop.read(350.0, other)
+    news = page.get_by_role("status").filter(has_text="1 new")
+    expect(news).to_be_visible()
+    expect(page.locator(".station-alarm h2")).to_have_text(["Oversize"])
+    news.get_by_role("button").click()
+    expect(page.locator(".station-alarm h2")).to_have_text(["Tool worn", "Oversize"])
+    page.evaluate("clearInterval(window.hand)")
 
 
 def test_it_says_plainly_that_live_data_is_lost(

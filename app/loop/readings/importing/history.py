@@ -185,18 +185,19 @@ class _Judge:
     def row(self, line: Line) -> tuple[Any, ...] | Flaw:
         reading, parameters = line.reading, self.parameters
         measured, results = float(reading.measured or 0.0), None
+        empirical_value = 0.0 if reading.is_by_hand else self.empirical_value
         if reading.touches is not None:
             try:
                 measured, points, fault = measured_value(parameters, reading.touches)
                 if fault is not None:
                     raise fault
-                results = results_of(parameters, reading.touches, points, self.empirical_value)
+                results = results_of(parameters, reading.touches, points, empirical_value)
             except TouchError as error:
                 return Flaw(line.number, "touches", "", touch_problem(error))
         decision = decide(
             parameters,
             LoopState(self.average),
-            deviation_of(measured, parameters.target, self.empirical_value),
+            deviation_of(measured, parameters.target, empirical_value),
             accepted=results is None or not results.rejected,
         )
         self.average = decision.average_after

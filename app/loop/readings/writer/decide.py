@@ -93,7 +93,7 @@ def decide_reading(pending: PendingWrites, entry: Entry, reading: ReadingIn, now
         confirm(pending, stream, tool, in_effect, min(now, reading.machined_at or measured_at))
     previous_tool, outstanding, amounts, compensated = corrections_in_effect(pending, tool, reading, parameters)
     average = stream.average
-    empirical_value = average.empirical_value if average else 0.0
+    empirical_value = average.empirical_value if average and not reading.is_by_hand else 0.0
     results = results_of(parameters, reading.touches or (), points, empirical_value) if points else None
     deviation = deviation_of(measured, parameters.target, empirical_value)
     course = None
