@@ -43,6 +43,7 @@ only through each other's queries and actions. frontend/ and migrations/ lie bes
         calibration      empirical values: against a gauge, in a ring, by pairs; calibrations that are due
         faults           faults that a machine reports about itself and its probe
         connections      heartbeats of the bridges beside the machines, and those that fall silent
+        quarantine       parts that an alarm concerns, set aside until each is released or scrapped
         alarm_response   the list of alarms, acknowledgement and what follows from it
         tools            tool memory (R10), average memory (R11), corrections and their life
         programs         program text of the controls: read, written

@@ -57,6 +57,8 @@ from app.loop.notes import pages as note_pages
 from app.loop.notifications import api as notifications
 from app.loop.notifications.notifier import Notifier
 from app.loop.programs import api as programs
+from app.loop.quarantine import api as quarantine
+from app.loop.quarantine import pages as quarantine_pages
 from app.loop.readings import api as readings
 from app.loop.readings import aqdef_api, results_actions, table_api
 from app.loop.readings.by_hand import api as by_hand
@@ -130,7 +132,7 @@ from app.web.page_queries import PageQueries
 from app.web.problems import add_problem_handlers
 from app.web.request_log import RequestLog
 from app.web.security import SecurityHeaders
-from app.web.templates import assets, environment
+from app.web.templates import assets
 
 # Each part of the shop floor brings its JSON routes (api) and its pages.
 ROUTERS: tuple[APIRouter, ...] = (
@@ -175,6 +177,7 @@ ROUTERS: tuple[APIRouter, ...] = (
     programs.router,
     text_api.router,
     alarms.router,
+    quarantine.router,
     notes.router,
     notifications.router,
     events_api.router,
@@ -202,6 +205,7 @@ ROUTERS: tuple[APIRouter, ...] = (
     capability_pages.router,
     six_pack.router,
     alarm_pages.router,
+    quarantine_pages.router,
     note_pages.router,
     queue_pages.router,
     text_pages.router,
@@ -390,7 +394,6 @@ def create_plant(settings: Settings, prefix: str = "") -> Application:
     app.state.waiting = {
         "to_do": TO_DO_COUNT.scalar_subquery(),
     }
-    environment()
     add_problem_handlers(app, recognise)
     app.mount("/static", assets())  # first, so that no file waits until hundreds of routes have been looked through
     for router in ROUTERS:

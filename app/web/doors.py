@@ -11,7 +11,7 @@ Door = Literal["plant", "todo", "quality", "machines", "setup"]
 # The first that fits the whole address counts.
 _BEHIND: dict[Door, re.Pattern[str]] = {
     "plant": re.compile(r"/|/characteristics/[^/]+(/readings/.*)?"),
-    "todo": re.compile(r"/(todo|alarms|corrections|proposals)(/.*)?"),
+    "todo": re.compile(r"/(todo|alarms|corrections|proposals|quarantines)(/.*)?"),
     "quality": re.compile(r"/(overview|compare|characteristics|signals|gauges|reports|parts)(/.*)?"),
     "machines": re.compile(
         r"/(machines|connections|plant|tools|calibration|work-zeros|alignments|forms|kinematics|notes)(/.*)?"

@@ -74,6 +74,8 @@ ADDED_TABLES = {
     "notification_route",
     "announced",
     "delivery",
+    "quarantine",
+    "quarantined_part",
 }
 
 

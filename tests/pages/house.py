@@ -95,6 +95,10 @@ PAGES = {
     "/alarms": ["/alarms", "/alarms?machine={machine}"],
     "/alarms/history": ["/alarms/history"],
     "/alarms/{number}": ["/alarms/{alarm}", "/alarms/{alarm}?action=keep_cutting"],
+    "/alarms/{number}/affected": ["/alarms/{alarm}/affected"],
+    "/quarantines": ["/quarantines", "/quarantines?state=all&machine={machine}"],
+    "/quarantines/{number}": ["/quarantines/{quarantine}"],
+    "/quarantines/{number}/parts/{part}/{what}": ["/quarantines/{quarantine}/parts/1/measure"],
     "/corrections": ["/corrections", "/corrections?machine={machine}"],
     "/corrections/{machine}/tools/{tool}": ["/corrections/{machine}/tools/5"],
     "/todo": ["/todo", "/todo?machine={machine}&mine=true"],
@@ -325,6 +329,7 @@ def furnished(server: Server) -> Shop:
         "POST", "/notes", 201, machine=made.machine, text="Coolant changed\n" + "Kühlschmierstoffkonzentration" * 4
     )
     made.call("POST", "/notes", 201, characteristic=made.characteristic, sequence=3, text="New batch of bars")
+    made.call("POST", "/quarantines", 201, alarm=made.alarms()[0]["id"], reason="Edge broken amid the batch")
     _notified(made)
     return made
 
@@ -362,6 +367,7 @@ def values_of(shop: Shop) -> dict[str, Any]:
         "characteristic": shop.characteristic,
         "alarm": shop.alarms()[0]["id"],
         "waiting": waiting[0]["number"],
+        "quarantine": of("quarantines")[0]["id"],
         "proposal": proposals[0]["id"],
         "signal": of("signals")[0]["id"],
         "note": of("notes")[-1]["id"],

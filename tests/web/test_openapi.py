@@ -348,6 +348,8 @@ FORMS: dict[str, tuple[str, ...] | None] = {
     "/account/password": None,
     "/account/pin": None,
     "/alarms/{number}/acknowledge": ("acknowledge_alarm",),
+    "/alarms/{number}/affected": ("set_parts_aside",),
+    "/quarantines/{number}/parts/{part}/{what}": ("measure_part_again", "release_part", "scrap_part"),
     "/alignments/new": ("align",),
     "/alignments/pallets/new": ("compose_pallet",),
     "/alignments/{number}/acknowledge": ("acknowledge_alignment",),

@@ -27,6 +27,12 @@ def chart_of(row: AlarmRow) -> str:
     return chart(row.characteristic.key, row.alarm.data) if chart and row.characteristic else ""
 
 
+def concerns_parts(row: AlarmRow) -> bool:
+    """Tell if parts cut before may be bad: of a characteristic, or of what a tool cuts."""
+    named = row.characteristic is not None or row.alarm.tool_memory is not None
+    return named and kind_named(row.alarm.kind).concerns_parts
+
+
 def what_to_do(kind: str) -> str:
     """Return the advice for the operator: where to look first."""
     return kind_named(kind).what_to_do()

@@ -42,7 +42,7 @@ class AlarmKind:
     `app.web.states`. ``actions``: the answers that make sense, the likeliest first; ``more_actions``: those that depend on
     the alarm. ``comments``: comments to choose from with one touch, by action, where they differ from the usual ones.
     ``outcomes``: sentences of what followed, by code. ``holds_corrections``: a correction is held until it is answered.
-    ``chart``: the address of the chart about it, of a characteristic's key and the alarm's values.
+    ``concerns_parts``: parts cut before may be bad. ``chart``: the address of the chart about it, of a characteristic's key and the alarm's values.
     """
 
     name: str
@@ -56,6 +56,7 @@ class AlarmKind:
     comments: Mapping[str, Texts] = field(default_factory=lambda: NONE)
     outcomes: Mapping[str, Callable[[Mapping[str, Any]], str]] = field(default_factory=lambda: NONE)
     holds_corrections: bool = False
+    concerns_parts: bool = False
     chart: Callable[[str, Mapping[str, Any]], str] | None = None
 
 

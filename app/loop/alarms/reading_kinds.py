@@ -63,6 +63,7 @@ def _set_aside() -> str:
 OVERSIZE = register(
     AlarmKind(
         "oversize",
+        concerns_parts=True,
         word=lambda: _("Oversize"),
         sentence=lambda alarm: _deviation(alarm, _("The part is too large: deviation {deviation}, tolerance {limit}.")),
         what_to_do=_set_aside,
@@ -73,6 +74,7 @@ OVERSIZE = register(
 UNDERSIZE = register(
     AlarmKind(
         "undersize",
+        concerns_parts=True,
         word=lambda: _("Undersize"),
         sentence=lambda alarm: _deviation(alarm, _("The part is too small: deviation {deviation}, tolerance {limit}.")),
         what_to_do=_set_aside,
@@ -83,6 +85,7 @@ UNDERSIZE = register(
 TOOL_WORN = register(
     AlarmKind(
         "tool_worn",
+        concerns_parts=True,
         word=lambda: _("Tool worn"),
         sentence=_tool_worn,
         what_to_do=lambda: _("Look at the cutting edge."),
@@ -125,6 +128,7 @@ def _cannot_be_stopped(alarm: Alarm) -> str:
 PROBE_FAULT = register(
     AlarmKind(
         "probe_fault",
+        concerns_parts=True,
         word=lambda: _("Probe fault"),
         sentence=_probe_fault,
         what_to_do=lambda: _("Clean the stylus, check chips, coolant and the program. Then report what it was."),
@@ -137,6 +141,7 @@ PROBE_FAULT = register(
 ACCEPTANCE = register(
     AlarmKind(
         "acceptance",
+        concerns_parts=True,
         word=lambda: _("Not accepted"),
         sentence=_not_accepted,
         what_to_do=lambda: _("Measure it by hand and confirm."),
@@ -146,6 +151,7 @@ ACCEPTANCE = register(
 OFFSET_LIMIT = register(
     AlarmKind(
         "offset_limit",
+        concerns_parts=True,
         word=lambda: _("Offset limit"),
         sentence=lambda alarm: _deviation(
             alarm,
@@ -164,6 +170,7 @@ OFFSET_LIMIT = register(
 IMPLAUSIBLE = register(
     AlarmKind(
         "implausible",
+        concerns_parts=True,
         word=lambda: _("Implausible jump"),
         sentence=lambda alarm: _deviation(
             alarm,

@@ -59,6 +59,7 @@ def _opposed(alarm: Alarm) -> str:
 OPPOSITE_EFFECT = register(
     AlarmKind(
         OPPOSITE,
+        concerns_parts=True,
         word=lambda: _("Opposite effect"),
         sentence=_opposed,
         what_to_do=lambda: _(
@@ -80,6 +81,7 @@ OPPOSITE_EFFECT = register(
 OFFSET_DIFFERS = register(
     AlarmKind(
         "offset_differs",
+        concerns_parts=True,
         word=lambda: _("Offset differs"),
         sentence=_differs,
         what_to_do=lambda: _("Read the true offset at the control and report it."),
@@ -117,6 +119,7 @@ def _not_taken(alarm: Alarm) -> str:
 CORRECTIONS_NOT_TAKEN = register(
     AlarmKind(
         "corrections_not_taken",
+        concerns_parts=True,
         word=lambda: _("Corrections are not taken"),
         sentence=_not_taken,
         what_to_do=lambda: _(
@@ -173,6 +176,7 @@ def _unusual(alarm: Alarm) -> str:
 UNUSUAL_GAIN = register(
     AlarmKind(
         "unusual_gain",
+        concerns_parts=True,
         word=lambda: _("Unusual gain"),
         sentence=_unusual,
         what_to_do=lambda: _(

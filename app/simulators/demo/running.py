@@ -21,6 +21,7 @@ log = logging.getLogger(__name__)
 DAY = 24 * 3600.0  # s
 STOPS = {"tool_worn", "probe_fault", "offset_limit"}
 LARGEST_LAG = 30.0  # s of the wall clock: what was missed beyond it is not made up for
+SETS_ASIDE = {"oversize", "undersize", "tool_worn"}  # the first of them shows a quarantine
 LOOKS_EVERY, IN_A_ROW = 10, 3  # parts between two looks at the board; parts not accepted that ask for a hand
 PATIENCE = (60.0, 90.0)  # s of the wall clock until the simulated operator steps in
 
@@ -62,6 +63,7 @@ class Line:
         self._ending = ending
         self._changed_at: dict[int, str | None] = {}
         self._fault_told = False  # the machine was ordered to stop because of what its dirty stylus measured
+        self._set_aside = False
         self._patience: dict[str, float] = {}  # what waits for a person, and until when we leave it to others
         self.pace = Pace(1.0, datetime.now(UTC), 0.0)
 
@@ -271,7 +273,11 @@ class Line:
 
     def _acknowledge(self, alarm: dict[str, Any], action: str, comment: str) -> None:
         body = {"action": action, "comment": f"{comment} (simulated operator)"}
+        reason = "Until they are measured by hand (simulated operator)"
         try:
+            if alarm["kind"] in SETS_ASIDE and not self._set_aside:
+                self._set_aside = True
+                self._operator.post("/quarantines", {"alarm": alarm["id"], "reason": reason}, repeat=True)
             self._operator.post(f"/alarms/{alarm['id']}/acknowledge", body | self._measured_by_hand(alarm), repeat=True)
         except Conflict as first:
             log.info("%s: %s", self.key, first)

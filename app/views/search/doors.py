@@ -22,6 +22,7 @@ def doors() -> list[Door]:
         Door(_("To do"), "/todo", _("what waits for a person, open tasks")),
         Door(_("Alarms"), "/alarms", _("acknowledge, tool worn, probe fault")),
         Door(_("History of alarms"), "/alarms/history", _("acknowledged alarms")),
+        Door(_("Quarantines"), "/quarantines", _("parts set aside, affected parts, release, scrap, containment")),
         Door(_("Approvals"), "/corrections", _("corrections that wait, approve, held")),
         Door(_("Proposals"), "/proposals", _("proposed parameters, what-if")),
         Door(

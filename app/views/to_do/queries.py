@@ -1,4 +1,4 @@
-"""Everything that waits for a person: active alarms, corrections to decide about, open proposals, background jobs that fail. Never writes.
+"""Everything that waits for a person: active alarms, corrections to decide about, parts set aside, open proposals, background jobs that fail. Never writes.
 
 A held correction is part of the alarm that holds it and counts only where none does. A calibration that is overdue and a
 fixture that has shifted are alarms. The count is the same for everybody, whatever their role.
@@ -14,11 +14,13 @@ from sqlalchemy.orm import Session
 from app.access.callers import Caller, Role
 from app.jobs.tables import JobFailure
 from app.jobs.wording import job_word
-from app.language.i18n import _
+from app.language.i18n import _, ngettext
 from app.language.numbers import um
 from app.loop.alarm_response import queries as alarms
 from app.loop.alarm_response import wording
 from app.loop.alarms.reading_kinds import HOLDING
+from app.loop.quarantine import queries as quarantine
+from app.loop.quarantine.tables import Quarantine
 from app.loop.tables.alarms import Alarm
 from app.loop.tables.characteristics import Characteristic
 from app.loop.tables.machines import Machine
@@ -28,7 +30,7 @@ from app.quality.what_if import queries as what_if
 from app.quality.what_if.tables import ParameterProposal
 from app.web.states import word_of
 
-Kind = Literal["alarm", "correction", "proposal", "job"]
+Kind = Literal["alarm", "correction", "quarantine", "proposal", "job"]
 MOST = 200  # of each kind, on one page
 
 
@@ -68,6 +70,7 @@ _TO_DECIDE = (Correction.status == "awaiting_approval") | _held_alone()
 COUNT: Select[int] = select(
     alarms.ACTIVE_COUNT.scalar_subquery()
     + select(func.count()).select_from(Correction).where(_TO_DECIDE).scalar_subquery()
+    + quarantine.OPEN_COUNT.scalar_subquery()
     + select(func.count()).where(ParameterProposal.status == "open").scalar_subquery()
     + select(func.count()).select_from(JobFailure).scalar_subquery()
 )
@@ -83,6 +86,7 @@ def count_by_machine(session: Session) -> dict[int, int]:
     waiting = union_all(
         select(Alarm.machine_id).where(Alarm.acknowledged_at.is_(None)),
         select(Correction.machine_id).where(_TO_DECIDE),
+        select(Quarantine.machine_id).where(quarantine.IS_OPEN),
         select(ParameterProposal.machine_id).where(ParameterProposal.status == "open"),
     ).subquery()
     query = select(waiting.c.machine_id, func.count()).group_by(waiting.c.machine_id)
@@ -91,7 +95,8 @@ def count_by_machine(session: Session) -> dict[int, int]:
 
 def tasks(session: Session, machine: Machine | None = None, caller: Caller | None = None) -> list[Task]:
     """All that waits, alarms first, the most urgent of them, then the oldest of each kind: at one machine, or what one person's role may do."""
-    found = [*_alarms(session, machine), *_corrections(session, machine), *_proposals(session, machine)]
+    found = [*_alarms(session, machine), *_corrections(session, machine), *_quarantines(session, machine)]
+    found += _proposals(session, machine)
     if machine is None:
         found += _jobs(session)
     return [task for task in found if caller is None or caller.may(task.role)]
@@ -149,6 +154,25 @@ def _corrections(session: Session, machine: Machine | None) -> Iterator[Task]:
             f"/corrections?machine={at.key}#correction-{correction.number}",
             "operator",
             correction.number,
+        )
+
+
+def _quarantines(session: Session, machine: Machine | None) -> Iterator[Task]:
+    rows = quarantine.quarantines(session, machine_id=machine.id if machine else None, state="open", limit=MOST)
+    for row in reversed(rows):
+        yield Task(
+            "quarantine",
+            "quarantined",
+            _("Quarantine"),
+            row.machine,
+            _("Alarm {number}").format(number=row.quarantine.alarm_id),
+            ngettext("{n} part is set aside: {why}", "{n} parts are set aside: {why}", row.open).format(
+                n=row.open, why=row.quarantine.reason
+            ),
+            row.quarantine.made_at,
+            _("Decide"),
+            f"/quarantines/{row.quarantine.id}",
+            "operator",
         )
 
 

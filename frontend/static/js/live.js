@@ -17,7 +17,7 @@ const URL_OF_EVENTS = document.querySelector("meta[name=events]")?.content ?? he
 const KINDS = [
   "reading", "correction", "alarm", "tool", "average", "calibration", "characteristic", "machine",
   "form", "work_zero", "alignment", "kinematics", "gauge_study", "baseline", "signal", "report", "proposal", "job",
-  "note", "connection", "touch_test", "delivery", "notifications",
+  "note", "connection", "touch_test", "quarantine", "delivery", "notifications",
 ];
 const SILENCE = 15_000; // ms; three heartbeats missed
 const RETRY = 3_000;

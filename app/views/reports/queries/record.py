@@ -9,6 +9,8 @@ from app.language.i18n import _
 from app.loop.alarm_response import wording as alarm_wording
 from app.loop.characteristics import wording
 from app.loop.notes.queries import on_charts_of
+from app.loop.quarantine import wording as quarantine_wording
+from app.loop.quarantine.tables import QuarantinedPart
 from app.loop.readings import queries as readings
 from app.loop.tables.alarms import Alarm
 from app.loop.tables.notes import Note
@@ -99,6 +101,51 @@ def notes(frame: Frame) -> Section | None:
         more=total - len(rows),
     )
     return Section("notes", _("Notes"), table=table)
+
+
+def quarantined(frame: Frame) -> Section | None:
+    """Parts of the readings of the period that were set aside, those known by name alone among them; nothing where none was."""
+    here = (
+        QuarantinedPart.machine_id == frame.current.machine.id,
+        QuarantinedPart.characteristic_id == frame.current.characteristic.id,
+    )
+    lists = select(QuarantinedPart.quarantine_id).where(*here, frame.holds(QuarantinedPart.sequence))
+    of_period = QuarantinedPart.sequence.is_(None) | frame.holds(QuarantinedPart.sequence)
+    inside = (*here, QuarantinedPart.quarantine_id.in_(lists), of_period)
+    total = frame.session.scalar(select(func.count()).select_from(QuarantinedPart).where(*inside)) or 0
+    newest = (QuarantinedPart.quarantine_id.desc(), QuarantinedPart.number.desc())
+    rows = frame.session.scalars(select(QuarantinedPart).where(*inside).order_by(*newest).limit(MOST_ROWS)).all()
+    if not rows:
+        return None
+    table = Table(
+        (
+            Column("quarantine", _("Quarantine"), 0.8, "right"),
+            Column("part", _("Part"), 1.4),
+            Column("order", _("Order"), 1.0),
+            Column("reading", _("Reading"), 0.7, "right"),
+            Column("deviation", _("Deviation"), 0.9, "right"),
+            Column("offset", _("Cut with offset"), 1.1, "right"),
+            Column("status", _("Status"), 0.9),
+            Column("remeasured", _("Measured again"), 1.1, "right"),
+            Column("decided", _("By whom, when, why"), 2.4),
+        ),
+        tuple(
+            (
+                count(row.quarantine_id),
+                words(quarantine_wording.part_name(row.part, row.part_to) if row.part else None),
+                words(row.order),
+                count(row.sequence),
+                deviation(row.deviation),
+                size(row.offset),
+                words(quarantine_wording.status_word(row.status)),
+                size(row.remeasured),
+                words(quarantine_wording.decided(row)),
+            )
+            for row in rows
+        ),
+        more=total - len(rows),
+    )
+    return Section("quarantine", _("Parts set aside"), table=table)
 
 
 def parameters(frame: Frame) -> Section:
