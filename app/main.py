@@ -132,7 +132,7 @@ from app.web.page_queries import PageQueries
 from app.web.problems import add_problem_handlers
 from app.web.request_log import RequestLog
 from app.web.security import SecurityHeaders
-from app.web.templates import assets
+from app.web.templates import assets, environment
 
 # Each part of the shop floor brings its JSON routes (api) and its pages.
 ROUTERS: tuple[APIRouter, ...] = (
@@ -394,6 +394,7 @@ def create_plant(settings: Settings, prefix: str = "") -> Application:
     app.state.waiting = {
         "to_do": TO_DO_COUNT.scalar_subquery(),
     }
+    environment()
     add_problem_handlers(app, recognise)
     app.mount("/static", assets())  # first, so that no file waits until hundreds of routes have been looked through
     for router in ROUTERS:

@@ -14,5 +14,7 @@ the public API through ``inband_client`` and imports nothing of the server.
     guards           the bridge's own limits for a correction, whatever the server says
     control_side     the task that talks to one control
     server_side      the task that talks to the server for one machine
+    proving          the touch test of one location at the command line; proving_by_page: with a person's answers at the page
+    loops            the event loop, and how signals end it
     program          all machines together, each with its own tasks
 """

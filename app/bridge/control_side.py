@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 from functools import partial
 from typing import TypeVar, cast
 
-from app.bridge import guided_test, log_lines
+from app.bridge import log_lines, proving_by_page
 from app.bridge.links import (
     STOPPING,
     DecisionCarrier,
@@ -133,7 +133,7 @@ async def _decide(unit: Unit, beside: Beside) -> None:
 
 async def _connected(unit: Unit, beside: Beside) -> None:
     machine, link, store = unit.machine, unit.link, unit.store
-    await guided_test.resume(unit)
+    await proving_by_page.resume(unit)
     async with asyncio.timeout(machine.patience):
         unit.identity = await link.connect()
     look_who_answers(unit.identity, machine.identity)
@@ -146,7 +146,7 @@ async def _connected(unit: Unit, beside: Beside) -> None:
     full = False
     while True:
         if unit.test is not None:
-            await guided_test.advance(unit)
+            await proving_by_page.advance(unit)
         if time.monotonic() >= full_at:
             full, full_at = await store.is_full(), time.monotonic() + FULL_EVERY
             await unit.look_if_held()  # the server's side does not come to it while the server is unreachable

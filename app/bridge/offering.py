@@ -10,7 +10,7 @@ import time
 from collections.abc import Mapping, Sequence
 from datetime import UTC, datetime
 
-from app.bridge import guided_test
+from app.bridge import proving_by_page
 from app.bridge.guards import Known, against
 from app.bridge.links import Order
 from app.bridge.store_tables import Intent
@@ -83,7 +83,7 @@ async def ask(unit: Unit, client: AsyncClient) -> None:
     if machine.corrections == "none":
         return
     if unit.test is not None and unit.test.holds:
-        _note(unit, [HeldBack(unit.test.tool_memory, None, guided_test.holds(unit.test))])
+        _note(unit, [HeldBack(unit.test.tool_memory, None, proving_by_page.holds(unit.test))])
         await _intend(unit, [])
         return
     unit.taken.clear()

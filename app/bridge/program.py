@@ -7,7 +7,7 @@ import ssl
 from pathlib import Path
 
 from app import memory
-from app.bridge import control_side, guided_test, offset_change, server_side
+from app.bridge import control_side, offset_change, proving_by_page, server_side
 from app.bridge.configuration import Configuration, Machine
 from app.bridge.kinds import kind_named
 from app.bridge.kinds.mtconnect import Context
@@ -53,7 +53,7 @@ async def run(configuration: Configuration, store: Store) -> None:
                 ("control", control_side.run(unit)),
                 ("server", server_side.run(unit, client, configuration.server)),
                 ("heartbeat", server_side.beat(unit, client, configuration.server)),
-                ("touch test", guided_test.run(unit, client)),
+                ("touch test", proving_by_page.run(unit, client)),
             ):
                 tasks.append(asyncio.create_task(work, name=f"{machine.key} {name}"))
         tasks.append(asyncio.create_task(memory.give_back_free_memory(), name="memory"))
@@ -68,7 +68,7 @@ async def run(configuration: Configuration, store: Store) -> None:
                 task.result()
         finally:
             try:
-                await guided_test.end_all(units)
+                await proving_by_page.end_all(units)
             finally:
                 await ended(tasks)
 

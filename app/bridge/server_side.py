@@ -10,7 +10,7 @@ from datetime import UTC, datetime
 from typing import Any
 
 from app import __version__
-from app.bridge import guided_test, log_lines, offering
+from app.bridge import log_lines, offering, proving_by_page
 from app.bridge.configuration import Server
 from app.bridge.links import STOPPING, Decided, carries_decisions
 from app.bridge.offering import MOST_REASON, REFUSED, line, not_from_inband
@@ -213,7 +213,7 @@ async def beat(unit: Unit, client: AsyncClient, server: Server) -> None:
         try:
             answer = await client.heartbeat(unit.machine.key, **await heartbeat(unit))
             await _look_back(unit, answer.get("server") or {})
-            await guided_test.hear(unit, answer.get("touch_test"))
+            await proving_by_page.hear(unit, answer.get("touch_test"))
         except Invalid as error:  # nobody else says it, and the server takes this bridge for silent
             log.warning("%s: %s", unit.machine.key, error)
         except (ProblemError, StoreError) as error:  # the control's and the server's side say it

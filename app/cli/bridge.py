@@ -304,7 +304,7 @@ def touch_test(
 
     Corrections reach a location only after this. Stop the bridge, and let nothing run on the machine.
     """
-    from app.bridge.touch_test import run as run_test
+    from app.bridge.proving import run as run_test
 
     async def work(configuration: "Configuration", store: "Store") -> None:
         chosen = next(each for each in configuration.machines if each.key == _known(configuration, machine))

@@ -7,9 +7,11 @@ for forms), `to_do` (how many things wait for a person, or None if not known). `
 
 from __future__ import annotations
 
+import weakref
 from functools import cache
 from http import HTTPStatus
-from typing import Any
+from threading import Lock
+from typing import TYPE_CHECKING, Any
 
 from jinja2 import Environment, FileSystemLoader, StrictUndefined, Template
 from starlette.requests import Request
@@ -28,6 +30,9 @@ from app.web.paging import address
 from app.web.request_log import note_reason
 from app.web.terms import term_of
 
+if TYPE_CHECKING:
+    from collections.abc import MutableMapping
+
 TEMPLATE_DIR = HOUSE / "frontend" / "templates"
 THEME_COOKIE = "inband_theme"
 TELL_LAG = 2.0
@@ -40,10 +45,27 @@ def assets() -> Assets:
     return Assets()
 
 
+class OneByOne(Environment):
+    """An environment in which one thread compiles a template, while others that need it wait.
+
+    After a start all tablets of a plant ask for their pages at once, and twenty threads compiled the same templates twenty times.
+    """
+
+    def __init__(self, **options: Any) -> None:
+        super().__init__(**options)
+        self._compiling = Lock()
+
+    def _load_template(self, name: str, globals: MutableMapping[str, Any] | None) -> Template:  # noqa: A002 - its name in jinja2
+        if self.cache is None or (weakref.ref(self.loader), name) in self.cache:
+            return super()._load_template(name, globals)
+        with self._compiling:
+            return super()._load_template(name, globals)
+
+
 @cache
 def environment() -> Environment:
-    """The one Jinja2 environment: escaped, strict about missing names, translated."""
-    env = Environment(
+    """The one Jinja2 environment: escaped, strict about missing names, translated. Made before threads ask for it."""
+    env = OneByOne(
         loader=FileSystemLoader(TEMPLATE_DIR),
         autoescape=True,
         undefined=StrictUndefined,

@@ -170,9 +170,12 @@ def named(verbs: Iterable[Verb[On, Any]], name: str, on: On, back: str) -> Verb[
     raise NotFound(_("There is nothing at this address."), back)
 
 
-def said(verbs: Iterable[Verb[Any, Any]], name: str, number: int) -> str | None:
-    """The page's message after the act; None for a name that no verb has."""
-    return next((verb.said().format(n=number) for verb in verbs if verb.name == name), None)
+def said(
+    verbs: Iterable[Verb[Any, Any]], name: str, number: int | None, more: Mapping[str, str] | None = None
+) -> str | None:
+    """The page's message after the act, or one of `more`, which has those of what is no verb; None for an unknown name."""
+    words = (more or {}).get(name) or next((verb.said() for verb in verbs if verb.name == name), None)
+    return None if words is None else words.format(n=number or 0)
 
 
 def ask(

@@ -7,7 +7,7 @@ from datetime import datetime
 from pathlib import Path
 from typing import Any
 
-from app.bridge import control_side, guided_test, server_side
+from app.bridge import control_side, proving_by_page, server_side
 from app.bridge.configuration import Location, Machine, Server
 from app.bridge.links import ControlAway
 from app.bridge.registers import RegisterLink
@@ -134,7 +134,7 @@ async def bridge(shop: Shop, unit: Unit, *, heartbeat: bool = False) -> AsyncIte
     """The tasks of one machine, for as long as the block runs."""
     server = Server(url=shop.server.url, ask=0.2, heartbeat=0.1)
     async with AsyncClient(server.url, shop.machine_key, patience=0.0, verify=TLS) as client:
-        work = [control_side.run(unit), server_side.run(unit, client, server), guided_test.run(unit, client)]
+        work = [control_side.run(unit), server_side.run(unit, client, server), proving_by_page.run(unit, client)]
         if heartbeat:
             work.append(server_side.beat(unit, client, server))
         tasks = [asyncio.create_task(each) for each in work]

@@ -97,7 +97,7 @@ def test_it_runs_where_nothing_of_the_server_is_and_takes_little_room(shop: Shop
         command = [str(python), "-m", "app", "bridge", "--config", str(plant(shop, tmp_path))]
         bridge = subprocess.Popen(command, cwd=tmp_path, env=bare(), stderr=stderr)
     try:
-        until(lambda: stored(shop) or bridge.poll() is not None)
+        until(lambda: stored(shop) or bridge.poll() is not None, 180)
         assert stored(shop) == [40.006], log.read_text()
         bridge.send_signal(signal.SIGTERM)
         assert bridge.wait(60) == 0, log.read_text()

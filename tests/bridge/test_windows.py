@@ -62,7 +62,7 @@ def test_every_module_is_imported_and_a_reading_arrives_and_ctrl_c_ends_it(shop:
     with (tmp_path / "log").open("w") as log:
         bridge = subprocess.Popen(command, stderr=log)
     try:
-        until(lambda: stored(shop) or bridge.poll() is not None)
+        until(lambda: stored(shop) or bridge.poll() is not None, 180)  # it imports everything first
         assert stored(shop) == [40.006], (tmp_path / "log").read_text()
         until((tmp_path / "cmm" / "done" / "part.csv").exists)
         bridge.send_signal(signal.SIGINT)

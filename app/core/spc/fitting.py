@@ -8,9 +8,10 @@ Nothing here is simulated, so that a number is the same each time. p of A^2 for 
 chi-squares, its weights the eigenvalues of (min(u, v) - u v - psi(u)' I^-1 psi(v)) / sqrt(u(1 - u) v(1 - v)), with psi the
 derivatives of the distribution function and I the information of a reading (M. A. Stephens, Asymptotic results for
 goodness-of-fit statistics with unknown parameters, Ann. Stat. 4 (1976)); the sum by three moments (Buckley and Eagleson 1988).
-Interval of the index: the delta method on its logarithm, with the same information.
+Interval of the index: the delta method on its logarithm, with the same information, over all distributions that fit as well.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 from math import exp, log, sqrt
@@ -25,6 +26,8 @@ from app.core.spc.refusal import Floats, Reason, Refused, checked
 from app.core.spc.resolution import must_resolve
 
 FITS = 0.01
+AS_GOOD = 3.0
+"""Difference of the criterion up to which the readings hardly tell two distributions apart: odds below 5 to 1 (Kass and Raftery 1995)."""
 MOST_FITTED = 5000
 """Of more readings so many, evenly taken, as for the test of normality."""
 _Z, _WEIGHTS = np.polynomial.legendre.leggauss(160)
@@ -127,7 +130,7 @@ def fitted(
         median=median,
         high=high,
         pp=pp,
-        ppk=_index(best, turned, limits, len(x), confidence),
+        ppk=_over_all_as_good(tried, turned, limits, len(x), confidence),
         ppm=Fallout(below, above),
         ppm_observed=observed_ppm(limits, x),
     )
@@ -248,6 +251,19 @@ def _index(fit: Fit, turned: int, limits: Limits, readings: int, confidence: flo
     if value <= 0:
         return Index(value, value - error, value + error, "delta")
     return Index(value, value * exp(-error / value), value * exp(error / value), "delta")
+
+
+def _over_all_as_good(tried: Sequence[Fit], turned: int, limits: Limits, readings: int, confidence: float) -> Index:
+    """The index by the best fit, with the interval that holds those of all fits which the readings do not tell from it.
+
+    tried: the best criterion first; at least one is not rejected.
+    """
+    fits = [fit for fit in tried if fit.fits]
+    as_good = [fit for fit in fits if fit.criterion <= fits[0].criterion + AS_GOOD]
+    indices = [_index(fit, turned, limits, readings, confidence) for fit in as_good]
+    low = min(index.low for index in indices if index.low is not None)
+    high = max(index.high for index in indices if index.high is not None)
+    return Index(indices[0].value, low, high, "delta")
 
 
 class Choice(StrEnum):

@@ -172,6 +172,5 @@ def done(code: str, number: int | None) -> str | None:
         "taken": _("Run {n} is stored."),
         "again": _("Run {n} was already stored; nothing was changed."),
         "plan": _("The limits are saved; they apply from the next run."),
-    }.get(code)
-    n = number or 0
-    return (said(RUN, code, n) or said((RESTORE,), code, n)) if sent is None else sent.format(n=n)
+    }
+    return said((*RUN, RESTORE), code, number, sent)

@@ -36,8 +36,8 @@ from app.loop.readings import queries as reading_queries
 from app.loop.tables.characteristics import Characteristic
 from app.loop.tables.readings import Stream
 from app.loop.tables.tools import Correction
-from app.loop.tools import actions as offsets
-from app.loop.tools import queries as offset_queries
+from app.loop.tools import actions as tool_actions
+from app.loop.tools import queries as tool_queries
 from app.loop.tools import sister_actions
 from app.loop.tools.alarm_kinds import OFFSET_DIFFERS
 
@@ -159,10 +159,10 @@ def _tool_replaced(session: Session, row: AlarmRow, comment: str, caller: Caller
     """A tool that was changed since the alarm was last raised is not changed again, unless its offset is said."""
     alarm, machine = row.alarm, row.machine
     assert alarm.tool_memory is not None
-    tool = offset_queries.tool(session, machine, alarm.tool_memory)
+    tool = tool_queries.tool(session, machine, alarm.tool_memory)
     if offset is None and tool.changed_at is not None and tool.changed_at >= alarm.last_at:
         return [{"code": "tool_changed_already", "tool": tool.number, "at": tool.changed_at.isoformat()}]
-    done = offsets.change_tool(
+    done = tool_actions.change_tool(
         session, machine, alarm.tool_memory, NO_OFFSET if offset is None else offset, comment, caller
     )
     outcome: Outcome = [
@@ -188,7 +188,7 @@ def _keep_cutting(session: Session, row: AlarmRow, comment: str, caller: Caller)
         if denied:
             outcome.append({"code": "readings_disagree"})
     elif row.held is not None:
-        released = offsets.decide(session, row.machine, row.held.number, "release", comment, caller).correction
+        released = tool_actions.decide(session, row.machine, row.held.number, "release", comment, caller).correction
         outcome.append({"code": "correction_released", "number": released.number, "amount": released.amount})
     elif row.alarm.kind == TOOL_WORN.name:
         outcome.append({"code": "nothing_held"})
@@ -219,7 +219,7 @@ def _level_follows(session: Session, row: AlarmRow) -> bool:
     stream.level_sequence = last
     if row.alarm.kind == IMPLAUSIBLE.name and row.held is not None and stream.average_memory:
         # Corrected in full, as in the zones within R37: the average begins again.
-        offsets.restart_averages(session, row.machine, [stream.average_memory], datetime.now(UTC))
+        tool_actions.restart_averages(session, row.machine, [stream.average_memory], datetime.now(UTC))
     session.flush()
     return True
 
@@ -228,7 +228,7 @@ def _sister_tool(session: Session, row: AlarmRow, comment: str, caller: Caller) 
     """A tool that was switched for another alarm of the same trouble is not switched again."""
     number = row.alarm.tool_memory
     assert number is not None
-    tool = offset_queries.tool(session, row.machine, number)
+    tool = tool_queries.tool(session, row.machine, number)
     if tool.sister is not None and not sister_actions.on_tool(session, row.machine, number):
         return [{"code": "switched_already", "tool": number, "sister": tool.sister}]
     done = sister_actions.switch_to_sister(session, row.machine, number, comment, caller)
@@ -248,12 +248,12 @@ def _offset_set(
     """The true offset, as a manual edit; one that was entered by hand since the alarm was last raised needs no other."""
     number = row.alarm.tool_memory
     assert number is not None
-    tool = offset_queries.tool(session, row.machine, number)
+    tool = tool_queries.tool(session, row.machine, number)
     if offset is None and tool.reset_at is not None and tool.reset_at >= row.alarm.last_at:
         return [{"code": "offset_told_already", "tool": number, "offset": tool.offset}]
     true = tool.offset if offset is None else offset
     reason = comment if changed_by is None else _("{who}: {why}").format(who=changed_by, why=comment)
-    done = offsets.edit_tool(session, row.machine, number, true, reason, caller)
+    done = tool_actions.edit_tool(session, row.machine, number, true, reason, caller)
     outcome: Outcome = [{"code": "offset_set", "tool": number, "offset": done.tool.offset}]
     if changed_by is not None:
         outcome[0]["changed_by"] = changed_by
@@ -295,7 +295,7 @@ def _false_reading(session: Session, row: AlarmRow, comment: str, caller: Caller
 def _withdraw(session: Session, row: AlarmRow, correction: Correction, comment: str, caller: Caller) -> dict[str, Any]:
     if correction.status == "applied":
         return {"code": "correction_applied", "number": correction.number, "amount": correction.amount}
-    offsets.decide(session, row.machine, correction.number, "rejected", comment, caller)
+    tool_actions.decide(session, row.machine, correction.number, "rejected", comment, caller)
     return {"code": "correction_withdrawn", "number": correction.number, "amount": correction.amount}
 
 
@@ -309,7 +309,7 @@ def _resume(session: Session, row: AlarmRow) -> Outcome:
         .returning(Stream.characteristic_id)
         .execution_options(synchronize_session=False)
     ).all()
-    tools = offsets.resume_tools(session, row.machine, row.alarm.id)
+    tools = tool_actions.resume_tools(session, row.machine, row.alarm.id)
     keys = session.scalars(
         select(Characteristic.key)
         .where(Characteristic.machine_id == row.alarm.machine_id, Characteristic.id.in_(paused))

@@ -44,7 +44,7 @@ from app.loop.machines.queries import lock_machines
 from app.loop.tables.calibration import CalibrationAcceptance, CalibrationPlan, CalibrationRecord
 from app.loop.tables.machines import Machine
 from app.loop.tables.readings import Stream
-from app.loop.tools import actions as offsets
+from app.loop.tools import actions as tool_actions
 from app.web.created import Created, sent_before
 
 
@@ -298,9 +298,9 @@ def put_into_effect(
     session.flush()
     why = _("Calibration {number}: {reason}").format(number=made.number, reason=reason)
     if made.memory == "average":
-        offsets.set_empirical_value(session, machine, made.location, made.proposed, why, caller)
+        tool_actions.set_empirical_value(session, machine, made.location, made.proposed, why, caller)
     else:
-        offsets.edit_tool(session, machine, made.location, made.proposed, why, caller)
+        tool_actions.edit_tool(session, machine, made.location, made.proposed, why, caller)
 
 
 def accept(session: Session, machine: Machine, number: int, reason: str, caller: Caller) -> CalibrationRow:

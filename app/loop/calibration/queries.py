@@ -19,7 +19,7 @@ from app.loop.characteristics.queries import characteristics
 from app.loop.tables.calibration import CalibrationAcceptance, CalibrationRecord, PairedReading
 from app.loop.tables.characteristics import Characteristic
 from app.loop.tables.machines import Machine
-from app.loop.tools import queries as offsets
+from app.loop.tools import queries as tool_queries
 from app.web.fields import LARGEST_SERIAL
 
 CONFIDENCE = 0.95
@@ -87,8 +87,8 @@ class Suggestion(NamedTuple):
 def value_of(session: Session, machine: Machine, place: Place) -> float:
     """The empirical value or the offset in effect. Raises `NotFound` for a location that the machine has not."""
     if place.memory == "average":
-        return offsets.average(session, machine, place.location).empirical_value
-    return offsets.tool(session, machine, place.location).offset
+        return tool_queries.average(session, machine, place.location).empirical_value
+    return tool_queries.tool(session, machine, place.location).offset
 
 
 def _rows(machine: Machine) -> Select[CalibrationRecord, CalibrationAcceptance]:
@@ -342,7 +342,7 @@ def suggestion(session: Session, machine: Machine, location: int, confidence: fl
 
     A series begins when the empirical value is set: pairs from before tell of a probe that may be another by now.
     """
-    value = offsets.average(session, machine, location).empirical_value
+    value = tool_queries.average(session, machine, location).empirical_value
     since = origin(session, machine, location)
     rows = pairs(session, machine, location, limit=MOST_PAIRS, newest=True)
     differences = [pair.difference for pair in rows if pair.counts]

@@ -137,10 +137,9 @@ PLACE: tuple[Verb[OfPlace, Any], ...] = (
 
 def done(code: str, number: int | None) -> str | None:
     """The page's message after an act, or after something was typed in; None for an unknown one."""
-    n = number or 0
     typed = {
         "calibrated": _("Calibration {n} is stored."),
         "plan": _("The plan is set."),
-        "pairs": ngettext("{n} pair is stored.", "{n} pairs are stored.", n),
-    }.get(code)
-    return said(PLACE, code, n) if typed is None else typed.format(n=n)
+        "pairs": ngettext("{n} pair is stored.", "{n} pairs are stored.", number or 0),
+    }
+    return said(PLACE, code, number, typed)

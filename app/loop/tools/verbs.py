@@ -368,5 +368,5 @@ def done(code: str, number: int) -> str | None:
         "average-large": _(
             "The empirical value of R11 = {n} is set to more than 1 mm: no probe measures so far off. Is it µm?"
         ),
-    }.get(code)
-    return said((*CORRECTION, *TOOL), code, number) if more is None else more.format(n=number)
+    }
+    return said((*CORRECTION, *TOOL), code, number, more)

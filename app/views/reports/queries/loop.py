@@ -9,7 +9,7 @@ from app.files.documents.content import Column, Fact, Picture, Section, Table, c
 from app.language.i18n import _
 from app.loop.tables.tools import Correction, ToolEvent
 from app.loop.timeline import queries as timeline
-from app.loop.tools import wording as offsets
+from app.loop.tools import wording as tool_wording
 from app.quality.wear import queries as wears
 from app.quality.wear.chart import chart_of
 from app.quality.wear.figures import WearChart, wear_figure
@@ -35,7 +35,7 @@ def corrections(frame: Frame) -> Section:
     ).all()
     facts = [Fact("issued", _("Corrections"), count(sum(counted.values())))]
     facts += [
-        Fact(f"status_{status}", _("of these {status}").format(status=offsets.status_word(status)), count(number))
+        Fact(f"status_{status}", _("of these {status}").format(status=tool_wording.status_word(status)), count(number))
         for status, number in sorted(counted.items())
     ]
     facts.append(Fact("sum_applied", _("Sum of those applied"), deviation(total or 0.0)))
@@ -59,11 +59,11 @@ def corrections(frame: Frame) -> Section:
                 moment(row.created_at),
                 count(row.tool_memory),
                 deviation(row.amount),
-                words(offsets.status_word(row.status)),
+                words(tool_wording.status_word(row.status)),
                 moment(row.applied_at),
                 size(row.offset_after),
                 words(row.applied_by or row.decided_by),
-                words(offsets.why(row)),
+                words(tool_wording.why(row)),
             )
             for row in rows
         ),
@@ -104,7 +104,7 @@ def tools(frame: Frame) -> Section | None:
             (
                 moment(row.at),
                 count(row.number),
-                words(offsets.event_word(row.kind)),
+                words(tool_wording.event_word(row.kind)),
                 size(row.offset_before),
                 size(row.offset_after),
                 count(row.parts),

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from app.bridge import offset_change, touch_test
+from app.bridge import offset_change, proving
 from app.bridge.offset_change import noted
 from app.bridge.registers import RegisterLink
 from app.core.ring import Unit
@@ -24,7 +24,7 @@ class Control:
         self.model, self.store = model, store_in(folder)
         self.said: list[str] = []
         self.held: list[float] = []
-        monkeypatch.setattr(touch_test, "link_of", lambda chosen: RegisterLink(chosen, self.registers))
+        monkeypatch.setattr(proving, "link_of", lambda chosen: RegisterLink(chosen, self.registers))
         monkeypatch.setattr(offset_change, "LEAST_PAUSE", 0.01)
 
     @property
@@ -41,7 +41,7 @@ class Control:
             self.registers.away = self.registers.away or bool(cut_at and cut_at in question)
             return not no_to or no_to not in question
 
-        return run(touch_test.run(self.machine, 3, 0.010, self.store, self.said.append, ask))
+        return run(proving.run(self.machine, 3, 0.010, self.store, self.said.append, ask))
 
     def proved(self) -> str | None:
         known = run(self.store.known(self.machine.key)).get(3)

@@ -12,7 +12,7 @@ import psycopg
 import pytest
 from playwright.sync_api import Page, expect
 
-from app.bridge import guided_test, offset_change
+from app.bridge import offset_change, proving_by_page
 from app.bridge.configuration import Location, Machine
 from app.bridge.kinds import opcua
 from app.bridge.offset_change import noted
@@ -32,7 +32,7 @@ BEFORE, AFTER = 0.0, 0.01
 
 @pytest.fixture(autouse=True)
 def quick(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(guided_test, "EVERY", 0.05)
+    monkeypatch.setattr(proving_by_page, "EVERY", 0.05)
     monkeypatch.setattr(offset_change, "LEAST_PAUSE", 0.02)
 
 
@@ -389,7 +389,7 @@ def test_the_bridge_refuses_by_itself(
     async def work() -> None:
         one = unit(shop, model, store_in(tmp_path), **fields)
         one.state = "online"
-        await guided_test.hear(one, {"id": 1, "tool_memory": 3, "amount": 0.01, "state": "asked"})
+        await proving_by_page.hear(one, {"id": 1, "tool_memory": 3, "amount": 0.01, "state": "asked"})
         assert one.test is not None
         assert one.test.end is not None
         assert one.test.end[0] == "failed"
@@ -415,7 +415,7 @@ def test_a_test_that_the_store_knows_nothing_of_says_nothing_that_may_be_false(
     async def work() -> None:
         one = unit(shop, model, store_in(tmp_path))
         one.state = "online"
-        await guided_test.hear(one, {"id": 1, "tool_memory": 3, "amount": 0.01, "state": state})
+        await proving_by_page.hear(one, {"id": 1, "tool_memory": 3, "amount": 0.01, "state": state})
         assert one.test is not None
         assert one.test.end is not None
         assert one.test.end[0] == ends
@@ -432,14 +432,14 @@ def test_a_go_that_is_old_writes_nothing(shop: Shop, model: Model, tmp_path: Pat
         one = unit(shop, model, store_in(tmp_path))
         test = one.test = Guided(1, 3, 0.01, math.inf)
         await one.link.connect()
-        await guided_test.advance(one)
+        await proving_by_page.advance(one)
         assert test.reached == "read"
         said = {"state": "go", "refused": None, "ended_at": None}
         now = time.monotonic()
-        guided_test._heard(test, said | {"state_age": 2.0}, now - 29.0)
-        guided_test._heard(test, said | {"state_age": 0.0}, now)
+        proving_by_page._heard(test, said | {"state_age": 2.0}, now - 29.0)
+        proving_by_page._heard(test, said | {"state_age": 0.0}, now)
         for _ in range(2):
-            await guided_test.advance(one)
+            await proving_by_page.advance(one)
         assert test.end == ("cancelled", "The answer came too late to the bridge. Nothing was written.")
         assert model.offsets[PLACE] == BEFORE
         one.store.close()
@@ -518,7 +518,7 @@ def test_the_end_of_the_program_takes_back(shop: Shop, model: Model, tmp_path: P
         async with running(shop, one) as guide:
             await guide.ask()
             await guide.comes_to("written")
-            await guided_test.end_all([one])
+            await proving_by_page.end_all([one])
             assert model.offsets[PLACE] == pytest.approx(BEFORE)
         one.store.close()
 
@@ -528,7 +528,7 @@ def test_the_end_of_the_program_takes_back(shop: Shop, model: Model, tmp_path: P
 def test_the_end_of_the_bridge_takes_back_what_is_just_being_written(
     tmp_path: Path, model: Model, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(guided_test, "LAST", 2.0)
+    monkeypatch.setattr(proving_by_page, "LAST", 2.0)
     monkeypatch.setattr(offset_change, "LEAST_PAUSE", 0.3)
 
     async def work() -> None:
@@ -538,7 +538,7 @@ def test_the_end_of_the_bridge_takes_back_what_is_just_being_written(
         one.test = Guided(1, 3, 0.01, math.inf, heard="go", since=now, reached="read", change=change)
         async with controlled(one):
             await until(lambda: model.offsets[PLACE] == pytest.approx(AFTER), "the write")
-            await guided_test.end_all([one])
+            await proving_by_page.end_all([one])
         assert model.offsets[PLACE] == pytest.approx(BEFORE)
         one.store.close()
 

@@ -1,6 +1,6 @@
 """The touch test by the command: proves sign, factor, diameter or radius, unit and register of one tool location.
 
-At the page `app.bridge.guided_test` does the same with the answers of a person in the browser.
+At the page `app.bridge.proving_by_page` does the same with the answers of a person in the browser.
 """
 
 import asyncio
