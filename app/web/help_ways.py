@@ -4,6 +4,7 @@ import re
 
 _BEHIND: tuple[tuple[str, str], ...] = (
     # The first that fits the whole address counts.
+    (r"/station/[^/]+/sizes", "how-to/sizes-by-hand"),
     (r"/station(/.*)?|/setup/stations", "how-to/stations"),
     (r"/alarms(/.*)?|/todo", "how-to/acknowledge-alarms"),
     (r"/corrections(/.*)?", "how-to/approve-corrections"),

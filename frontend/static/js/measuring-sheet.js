@@ -20,7 +20,7 @@ class MeasuringSheet extends HTMLElement {
     this.form = this.querySelector("form");
     this.pad = this.querySelector(".number-keys");
     this.form.addEventListener("keydown", (event) => this.key(event));
-    this.form.addEventListener("input", (event) => this.shown(event.target));
+    this.form.addEventListener("input", (event) => this.typed(event.target));
     this.form.addEventListener("focusin", (event) => this.chosen(event.target));
     this.form.addEventListener("submit", () => this.sent());
     addEventListener("pageshow", () => this.wake());
@@ -52,7 +52,7 @@ class MeasuringSheet extends HTMLElement {
       const from = input.selectionStart ?? input.value.length, to = input.selectionEnd ?? from;
       if (button.hasAttribute("data-erases")) input.setRangeText("", from === to ? Math.max(0, from - 1) : from, to, "end");
       else input.setRangeText(button.dataset.types, from, to, "end");
-      this.shown(input);
+      this.typed(input);
     });
   }
 
@@ -81,12 +81,17 @@ class MeasuringSheet extends HTMLElement {
     this.form.requestSubmit(this.form.querySelector(".sheet-actions button"));
   }
 
-  shown(input) {
+  /** What was said about a size is about what was sent, not about what is typed now. */
+  typed(input) {
     if (!input.matches("input[data-size]")) return;
+    if (!Number.isNaN(sizeOf(input.value))) input.removeAttribute("aria-invalid");
+    this.shown(input);
+  }
+
+  shown(input) {
     const output = [...this.form.querySelectorAll("output")].find((each) => each.htmlFor.contains(input.id));
     const size = sizeOf(input.value);
     const off = size === null || Number.isNaN(size) ? null : Math.round((size - input.dataset.target) * 1e7) / 1e4; // µm
-    if (!Number.isNaN(size)) input.removeAttribute("aria-invalid");
     output.toggleAttribute("data-out", off !== null && Math.abs(off) > input.dataset.half * 1000 + 1e-6);
     const far = off !== null && Math.abs(off) >= 1000;
     output.textContent = off === null ? "" : `${off < 0 ? MINUS : "+"}${Math.abs(far ? off / 1000 : off).toFixed(far ? 3 : input.dataset.decimals)}\u00a0${far ? "mm" : "µm"}`;
