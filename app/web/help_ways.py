@@ -6,6 +6,7 @@ _BEHIND: tuple[tuple[str, str], ...] = (
     # The first that fits the whole address counts.
     (r"/station/[^/]+/sizes", "how-to/sizes-by-hand"),
     (r"/station(/.*)?|/setup/stations", "how-to/stations"),
+    (r"/alarms/[^/]+/affected|/quarantines(/.*)?", "how-to/quarantine"),
     (r"/alarms(/.*)?|/todo", "how-to/acknowledge-alarms"),
     (r"/corrections(/.*)?", "how-to/approve-corrections"),
     (r"/machines/[^/]+/corrections/program", "how-to/program-text"),
