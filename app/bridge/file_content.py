@@ -9,7 +9,7 @@ its time of modification too.
 import hashlib
 import io
 import json
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from math import isfinite
@@ -20,7 +20,7 @@ from msgspec import Struct
 
 from app.bridge.configuration import Machine, Positive
 from app.bridge.fields import EVERY, FIELDS, Form
-from app.bridge.file_rows import Fault, Found, Table, cell_of, csv_rows, has, ndjson_rows, reasons
+from app.bridge.file_rows import Fault, Found, Table, cell_of, csv_rows, has, ndjson_rows, reasons, units_of
 from app.bridge.links import Received
 from app.bridge.patterns import LONGEST_LINE, Patterns, TooSlow, check_expressions
 from app.core.ring import INCH
@@ -30,10 +30,10 @@ from app.files.formats import aqdef, aqdef_values, delimited, spreadsheet
 from app.files.formats.aqdef_context import context_of
 from app.files.formats.aqdef_keys import Keys
 from app.files.formats.aqdef_times import WallClock, day_order, time_of
-from app.files.formats.cell_values import Slashed, Unreadable, slashed, zone_named
+from app.files.formats.cell_values import Slashed, Unreadable, same_number, slashed, zone_named
 from app.files.formats.file_times import times_of
 from app.files.formats.repeats import Repeats
-from app.files.formats.units import LENGTHS, UnknownUnit, length_unit, unit_beside, unit_in
+from app.files.formats.units import LENGTHS, UnknownUnit, beside, length_unit, unit_in
 
 NAMES: Final = {"csv": "*.csv", "xlsx": "*.xls[xm]", "ndjson": "*.ndjson", "text": "*.txt", "aqdef": "*.df[qdxQDX]"}
 NOT_ALONE: Final = 2  # files of a pair
@@ -216,6 +216,7 @@ class _Reader:
                 seed.update(path.read_bytes())
         self._prefixes(seed)
         self.remarks = Repeats()
+        self.nominal: dict[str, tuple[int, str]] = {}
         if earlier is not None and earlier[0] in self.prefix:
             content.stamp = earlier[1]
 
@@ -234,9 +235,9 @@ class _Reader:
         match self.settings.format:
             case "csv":
                 delimiter = delimited.BLANKS if self.settings.delimiter == "blanks" else self.settings.delimiter
-                self._table(csv_rows(self.path, self._form_of_table(self.encoding, delimiter)))
+                self._rows(self._form_of_table(self.encoding, delimiter))
             case "xlsx":
-                self._table(csv_rows(self.path, self._form_of_table("utf-8", "\t")))
+                self._rows(self._form_of_table("utf-8", "\t"))
             case "ndjson":
                 self._table(ndjson_rows(self.lines))
             case "text":
@@ -252,7 +253,10 @@ class _Reader:
         names = {*self.machine.characteristics, *(() if self.settings.columns else FIELDS)}
         return Table(encoding, delimiter, columns, names, self.content.complete, self.settings.format == "xlsx")
 
-    def _table(self, rows: Iterator[tuple[int, Found]]) -> None:
+    def _rows(self, table: Table) -> None:
+        self._table(csv_rows(self.path, table), units_of(self.path, table))
+
+    def _table(self, rows: Iterator[tuple[int, Found]], unit: Callable[[str], str | None] = unit_in) -> None:
         columns = self.settings.columns or {name: name for name in FIELDS}
         table = list(rows)
         column = columns.get("measured_at", "")
@@ -268,14 +272,14 @@ class _Reader:
                 continue
             fields = {name: cell_of(row, column) for name, column in columns.items() if has(row, column)}
             if "unit" not in self.settings.columns:
-                fields["unit"] = unit_beside(row)
+                fields["unit"] = beside(row, "unit")
             sizes = (
                 [columns["measured"]]
                 if "measured" in fields
                 else [name for name in self.machine.characteristics if name in row]
             )
             try:
-                units |= {column: unit_in(column) for column in sizes if column not in units}
+                units |= {column: unit(column) for column in sizes if column not in units}
             except UnknownUnit as error:
                 reason = (
                     f"the header names the unit {error.word}, which is no length that is known ({', '.join(LENGTHS)}): "
@@ -285,6 +289,9 @@ class _Reader:
                 return
             if "measured" in fields:
                 name = str(fields.get("characteristic", EVERY)).strip()
+                if reason := self._other_nominal(line, name, str(beside(row, "nominal") or "").strip()):
+                    self._fault(line, "", reason)
+                    continue
                 self._take(line, name, fields, row, units[columns["measured"]])
                 continue
             if not sizes:
@@ -294,6 +301,16 @@ class _Reader:
             for name in sizes:
                 if row[name] not in {None, ""} and str(row[name]).strip():
                     self._take(line, name, fields | {"measured": row[name]}, row, units[name])
+
+    def _other_nominal(self, line: int, name: str, nominal: str) -> str:
+        """The reason against a row with another nominal size than the first of its name has: it is another characteristic."""
+        first, before = self.nominal.setdefault(name, (line, nominal)) if nominal else (line, "")
+        if not nominal or same_number(nominal, before):
+            return ""
+        return (
+            f"has the nominal size {nominal}, line {first} has {before} for {name!r}: two characteristics of one name? Name the"
+            ' columns that distinguish them, such as columns.characteristic = "Feature+Axis".'
+        )
 
     # --- text protocols
 

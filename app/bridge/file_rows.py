@@ -1,7 +1,7 @@
 """The rows of a table or of NDJSON by their columns, and what is wrong with one, in the order of the file."""
 
 import json
-from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from itertools import chain, islice
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -10,7 +10,7 @@ from app.bridge.json_text import read_json
 from app.files.formats import aqdef, delimited
 from app.files.formats.headings import TOP, Heading, as_wide, heading
 from app.files.formats.repeats import Repeats
-from app.files.formats.units import is_unit_column
+from app.files.formats.units import is_unit_column, unit_above, unit_in
 
 
 class Fault(NamedTuple):
@@ -68,7 +68,7 @@ def csv_rows(path: Path, table: Table) -> Iterator[tuple[int, Found]]:
         top = list(islice(rows, TOP))
         if not top:
             return
-        line, names = _heading(top, table)
+        line, names, _units, end = _heading(top, table)
         used = {part for column in table.columns for part in parts_of(column, names)}
         counted = {name for name in names if name in used or name in table.names or is_unit_column(name)}
         for name in sorted(name for name in counted if names.count(name) > 1):
@@ -78,7 +78,7 @@ def csv_rows(path: Path, table: Table) -> Iterator[tuple[int, Found]]:
             yield line, Fault(line, name, f"is no column of this file; it has {', '.join(filter(None, names))}.")
         if wanted:
             return
-        below = chain((row for row in top if row.line > line), rows)
+        below = chain((row for row in top if row.line > max(line, end)), rows)
         for row in _as_wide(below, len(names), delimiter, table):
             if isinstance(row, delimited.Unusable):
                 yield row.line or 0, Fault(row.line, "", str(row))
@@ -88,6 +88,19 @@ def csv_rows(path: Path, table: Table) -> Iterator[tuple[int, Found]]:
                 yield row.line, dict(zip(names, row.cells, strict=False))
     except UnicodeError:
         yield 0, Fault(None, "", f"This is not {table.encoding} text: name the encoding of the file.")
+
+
+def units_of(path: Path, table: Table) -> Callable[[str], str | None]:
+    """The unit of length of each column: in its name, in a row below it, or in the lines above the table. It raises `UnknownUnit`."""
+    try:
+        delimiter = table.delimiter or delimited.delimiter_of(path, table.encoding)
+        top = list(islice(delimited.rows(path, table.encoding, delimiter), TOP))
+    except (UnicodeError, delimited.Unusable):
+        top = []  # said of the rows
+    line, names, units, _end = _heading(top, table) if top else Heading(0, ())
+    above = unit_above(row.cells for row in top if row.line < line)
+    below = dict(zip(names, units, strict=False))
+    return lambda column: unit_in(column) or below.get(column) or above
 
 
 def parts_of(column: str, names: Collection[str]) -> list[str]:

@@ -8,7 +8,7 @@ from typing import Any, Final, NamedTuple
 from app.bridge.fields import EVERY, Form
 from app.bridge.json_text import read_json
 from app.files.formats.cell_values import Unreadable
-from app.files.formats.units import unit_beside
+from app.files.formats.units import UnknownUnit, beside, unit_in
 
 KINDS: Final[dict[str, tuple[type, ...]]] = {
     "characteristic": (str, int),
@@ -138,7 +138,7 @@ def foreign_readings(
         ]
     if not sizes:
         return [Found(None, None, {}, "The message has none of the members that characteristics names.")]
-    return list(_mapped(payload, machine, told, sizes, characteristics, form, alone="measured" in fields))
+    return list(_mapped(payload, machine, told, sizes, characteristics, form, fields))
 
 
 def _mapped(
@@ -148,10 +148,9 @@ def _mapped(
     sizes: list[tuple[str, Any, Any]],
     characteristics: Mapping[str, str],
     form: Form,
-    *,
-    alone: bool,
+    fields: Mapping[str, str],
 ) -> Iterator[Found]:
-    said = told.get("key")
+    said, alone = told.get("key"), "measured" in fields
     for name, size, unit in sizes:
         if (key := characteristics.get(name)) is None:
             yield Found(None, None, {}, f"{name!r} is not named in machine.{machine}.characteristics. Add it there.")
@@ -159,14 +158,15 @@ def _mapped(
         body: dict[str, Any] = {"characteristic": key}
         wrong = "unit"
         try:
-            own = form.in_unit(told.get("unit", unit))
+            own = form.in_unit(unit_in(fields.get("measured", name)), told.get("unit", unit))
             for field, value in {**told, "measured": size}.items():
                 if field not in {"characteristic", "unit", "key"}:
                     wrong = f"{field} = {json.dumps(value, ensure_ascii=False)[:40]}"
                     if (read := own.value(field, "" if value is None else value)) is not None:
                         body[field] = read
-        except Unreadable as error:
-            yield Found(None, None, {}, f"{wrong} {error}.")
+        except (Unreadable, UnknownUnit) as error:
+            words = error if isinstance(error, Unreadable) else f"{error.word}, in the name of the member, is no length"
+            yield Found(None, None, {}, f"{wrong} {words}.")
             continue
         if said is None and not body.keys() & {"measured_at", "machined_at", "part"}:
             words = (
@@ -186,7 +186,7 @@ def _unit_beside(content: Any, path: str) -> Any:
     while path:
         path = "" if path in content else path.rpartition(".")[0]
         around = member(content, path) if path else content
-        if isinstance(around, dict) and (unit := unit_beside(around)) is not None:
+        if isinstance(around, dict) and (unit := beside(around, "unit")) is not None:
             return unit
     return None
 

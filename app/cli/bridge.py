@@ -138,9 +138,13 @@ def preview(
     ],
     config: ConfigFile = PLANT,
 ) -> None:
-    """Say what each line of a file would become. Nothing is sent, moved or stored. For machines of kind folder."""
+    """Say what each line of a file would become. Nothing is sent, moved or stored. For machines of kind folder.
+
+    The server is asked for the targets, if it answers: sizes that no part can have are named.
+    """
     from app.bridge.file_content import files_of, read_content
     from app.bridge.file_rows import reasons
+    from app.bridge.plausible import Unasked, far_off, targets_of
     from app.files.formats.delimited import Unusable
 
     configuration = _configuration(config)
@@ -164,6 +168,16 @@ def preview(
         say("The file would go to the folder of failed files; nothing of it would be stored.")
         raise typer.Exit(1)
     say(f"{len(content.entries)} readings.")
+    try:
+        keys = [entry.body["characteristic"] for entry in content.entries]
+        doubts = far_off(content.entries, asyncio.run(targets_of(configuration, chosen, keys)))
+    except Unasked as error:
+        say(f"The sizes are not compared with their targets, the server does not say them: {error}", style="yellow")
+        return
+    for doubt in doubts:
+        say(f"✗ {doubt}", style="bold red")
+    if doubts:
+        raise typer.Exit(1)
 
 
 @bridge.command("hold")

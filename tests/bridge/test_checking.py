@@ -6,11 +6,13 @@ import termios
 from pathlib import Path
 
 import pytest
+import typer
 
 from app.bridge.checking import check
 from app.bridge.configuration import configuration_from
 from app.bridge.kinds.dprnt import PrintedLink
 from app.bridge.store import Store
+from app.cli.bridge import preview
 from app.core.printed_line import Printed, line_of
 from app.core.ring import Slot, Unit
 from tests.loops import run
@@ -115,3 +117,30 @@ def test_a_store_that_this_user_may_not_write_is_told(tmp_path: Path, monkeypatc
     monkeypatch.setattr(os, "access", lambda *_: False)
     said = findings(tmp_path, table("dprnt", listen=9))
     assert said[0].startswith(f"✗ store {tmp_path / 'inband-bridge.sqlite3'}: this user may not write {tmp_path};")
+
+
+@pytest.mark.parametrize(("size", "url", "words"), [
+    ("-0.002", None, "x: every size lies more than 1 mm (R36) from the target 40 mm, the first in line 2 with -0.002 mm."),
+    ("40.001", None, ""),
+    ("40.001", SERVER["url"], "The sizes are not compared with their targets"),
+])  # fmt: skip
+def test_a_preview_compares_sizes_with_their_targets(
+    shop: Shop, tmp_path: Path, capsys: pytest.CaptureFixture[str], size: str, url: str | None, words: str
+) -> None:
+    key = shop.another("seat", target=40.0, confidence_limit=1.0)
+    (tmp_path / "a.csv").write_text(f"measured;part\n{size};P1\n")
+    config = tmp_path / "plant.toml"
+    config.write_text(
+        f'server.url = "{url or shop.server.url}"\n[machine.{shop.machine}]\nkind = "folder"\nunit = "mm"\n'
+        f'secret = "{shop.machine_key}"\ncorrections = "none"\nfolder = {{ path = "{tmp_path}", format = "csv" }}\n'
+        f'characteristics = {{ "*" = "{key}" }}\n'
+    )
+    refused = False
+    try:
+        preview(shop.machine, tmp_path / "a.csv", config)
+    except typer.Exit:
+        refused = True
+    said = "".join(capsys.readouterr())
+    assert refused == (size == "-0.002")
+    assert words.replace("x:", f"{key}:") in " ".join(said.split())
+    assert ("not compared" in said) == (url is not None)

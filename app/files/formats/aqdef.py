@@ -53,11 +53,12 @@ class Remark(NamedTuple):
 
 @dataclass
 class Characteristic:
-    """One characteristic of a file: its index, the index of its part, and its fields by K number."""
+    """One characteristic of a file: its index, the index of its part, its fields by K number, and their lines."""
 
     index: int
     part: int
     fields: dict[str, str] = field(default_factory=dict)
+    lines: dict[str, int] = field(default_factory=dict)
 
     @property
     def number(self) -> str:
@@ -285,6 +286,7 @@ class _Describing:
             known = self.found.characteristics[index] = Characteristic(index, self._part)
             self._described.add(self._part)
         self._put(line, key, index, value, known.fields)
+        known.lines[key] = line
 
     def _put(self, line: int, key: str, index: int, value: str, fields: dict[str, str]) -> None:
         before = fields.get(key)

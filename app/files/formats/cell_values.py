@@ -21,6 +21,35 @@ _STROKES = re.compile(
     r"(\d{1,2})/(\d{1,2})/(\d{4})"
     r"(?:[\s,T]+(\d{1,2}):(\d{2})(?::(\d{2})(?:[.,](\d{1,6})\d*)?)?(?:\s*([AaPp])\.?[Mm]\.?)?)?"
 )
+_CLOCK = r"(?:[\s,T]+(?P<h>\d{1,2}):(?P<min>\d{2})(?::(?P<s>\d{2})(?:[.,](?P<f>\d{1,6})\d*)?)?(?:\s*(?P<half>[AaPp])\.?[Mm]\.?)?)?"
+_ONE_WAY = tuple(
+    re.compile(day + clock)
+    for day, clock in (
+        (r"(?P<y>\d{4})([/.])\s?(?P<m>\d{1,2})\2\s?(?P<d>\d{1,2})\.?", _CLOCK),
+        (
+            r"(?:[^\W\d_]{2,10}\.?,?\s+)?(?P<d>\d{1,2})\.?[\s-]{0,2}(?P<m>[^\W\d_]{3,9})\.?,?[\s-]{0,2}(?P<y>\d{4})",
+            _CLOCK,
+        ),
+        (r"(?:[^\W\d_]{2,10}\.?,?\s+)?(?P<m>[^\W\d_]{3,9})\.?\s+(?P<d>\d{1,2}),?\s+(?P<y>\d{4})", _CLOCK),
+        (r"(?P<y>\d{4})(?P<m>\d{2})(?P<d>\d{2})", r"[T_](?P<h>\d{2})(?P<min>\d{2})(?P<s>\d{2})(?P<f>)(?P<half>)"),
+    )
+)
+"""Dates that can be read in one way only: the year first, or the month by its name."""
+_MONTH_NAMES = (
+    "jan",
+    "feb",
+    "mar mrz",
+    "apr",
+    "may mai maj",
+    "jun",
+    "jul",
+    "aug avg",
+    "sep",
+    "oct okt",
+    "nov",
+    "dec dez dek",
+)
+_OFFSET = re.compile(r"(.*:\d{2}(?:[.,]\d+)?)\s?([Zz]|[+-]\d{2}(?::?\d{2})?)")
 _STROKED_DATE = re.compile(r"(\d{1,2})/(\d{1,2})/\d{2,4}(?!\d)", re.ASCII)
 _TWENTY_FOUR = re.compile(r"(?<=[T ])24(?=:00(?::00(?:[.,]0+)?)?(?:\s?(?:[Zz]|[+-]\d{2}(?::?\d{2})?))?$)")
 _COUNT = re.compile(
@@ -84,6 +113,20 @@ def number(text: str, decimal: str) -> float:
         return read_number(text, decimal)
     except NotANumber as error:
         raise Unreadable(_no_number(error.fault, decimal)) from None
+
+
+def same_number(one: str, other: str) -> bool:
+    """Tell if two cells are alike, or hold the same number.
+
+    >>> same_number("40", "40,000"), same_number("X", "X"), same_number("40", "X")
+    (True, True, False)
+    """
+    if one == other:
+        return True
+    try:
+        return read_number(one) == read_number(other)
+    except NotANumber:
+        return False
 
 
 def _no_number(fault: NumberFault, decimal: str) -> str:
@@ -161,6 +204,10 @@ def naive(text: str, pattern: str | None = None, order: DayOrder | None = None) 
 
     >>> naive("18.11.2025 24:00:00").isoformat(), naive("11/18/2025 12:06:10 AM").isoformat()
     ('2025-11-19T00:00:00', '2025-11-18T00:06:10')
+    >>> [str(naive(text)) for text in ("2025/11/18 6:05", "18-Nov-2025 6:05 PM", "Tue, 18 Nov 2025 06:05", "20251118T060500")]
+    ['2025-11-18 06:05:00', '2025-11-18 18:05:00', '2025-11-18 06:05:00', '2025-11-18 06:05:00']
+    >>> naive("26.10.2025 02:30:00 +0100").isoformat(), str(naive("Dez. 3, 2025"))
+    ('2025-10-26T02:30:00+01:00', '2025-12-03 00:00:00')
     """
     stripped = plain(text)
     if not stripped:
@@ -223,6 +270,11 @@ def _by_shape(text: str, order: DayOrder | None) -> datetime:
             return at_hour(year, month, day, hour, minute, second, match[7])
         if match := _STROKES.fullmatch(text):
             return _with_strokes(text, match, order)
+        if match := next(filter(None, (each.fullmatch(text) for each in _ONE_WAY)), None):
+            return _in_one_way(match.groupdict())
+        if match := _OFFSET.fullmatch(text):
+            with_offset = datetime.fromisoformat(f"2000-01-01T00:00{match[2].upper()}")
+            return _by_shape(match[1], order).replace(tzinfo=with_offset.tzinfo)
     except (ValueError, OverflowError) as error:
         if isinstance(error, Unreadable):
             raise
@@ -246,6 +298,25 @@ def _by_shape(text: str, order: DayOrder | None) -> datetime:
     )
 
 
+def _in_one_way(parts: dict[str, str | None]) -> datetime:
+    month = parts["m"] or ""
+    if not month.isdigit():
+        short = folded(month)[:3]
+        month = next((str(at) for at, names in enumerate(_MONTH_NAMES, 1) if short in names.split()), "0")
+    hour, minute, second = (int(parts[name] or 0) for name in ("h", "min", "s"))
+    hour = _of_day(hour, parts["half"])
+    return at_hour(int(parts["y"] or 0), int(month), int(parts["d"] or 0), hour, minute, second, parts["f"])
+
+
+def _of_day(hour: int, half: str | None) -> int:
+    """The hour of the day. half: the first letter of AM or PM. Raises `Unreadable`."""
+    if not half:
+        return hour
+    if not 1 <= hour <= _MONTHS:
+        raise Unreadable(_("is not a time: there is no hour {hour} with AM or PM").format(hour=hour))
+    return hour % 12 + (12 if half in "pP" else 0)
+
+
 def _with_strokes(text: str, match: re.Match[str], order: DayOrder | None) -> datetime:
     readings = slashed(text)
     if readings is Slashed.EITHER and order is None:
@@ -258,10 +329,7 @@ def _with_strokes(text: str, match: re.Match[str], order: DayOrder | None) -> da
                 month=first if alone == "day_first" else second
             )
         )
-    if match[8]:
-        if not 1 <= hour <= _MONTHS:
-            raise Unreadable(_("is not a time: there is no hour {hour} with AM or PM").format(hour=hour))
-        hour = hour % 12 + (12 if match[8] in "pP" else 0)
+    hour = _of_day(hour, match[8])
     month, day = (second, first) if (alone or order) == "day_first" else (first, second)
     return at_hour(year, month, day, hour, minute, seconds, match[7])
 

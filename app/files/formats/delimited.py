@@ -24,6 +24,7 @@ ENCODINGS = (
     "iso-8859-2",
     "iso-8859-5",
 )
+END = "END"  # alone in a row: so CALYPSO closes its tables
 SAMPLE = 64 * 1024
 LOOKED_AT = 1_000_000  # bytes from which an encoding is guessed
 _SIGNS_OF_ALL = "°±µ²³×·–—„“”‚‘’…€§«»\N{NO-BREAK SPACE}"
@@ -228,7 +229,7 @@ def _rows(path: Path, encoding: str, delimiter: str) -> Iterator[Row]:
                 raise Unusable(_why(str(error)), line) from None
             if line == 1 and cells and cells[0].startswith("sep="):
                 continue
-            if any(cell.strip() for cell in cells):
+            if (filled := [cell.strip() for cell in cells if cell.strip()]) and filled != [END]:
                 yield Row(line, cells)
 
 
@@ -263,8 +264,8 @@ def decimal_of(cells: Iterable[str]) -> str:
     """The decimal sign of these cells; a point when they do not tell."""
     commas = points = 0
     for cell in cells:
-        commas += bool(re.fullmatch(r"\s*[+\-\N{MINUS SIGN}]?\d*,\d+\s*", cell))
-        points += bool(re.fullmatch(r"\s*[+\-\N{MINUS SIGN}]?\d*\.\d+\s*", cell))
+        commas += bool(re.fullmatch(r"\s*[+\-\N{MINUS SIGN}]?\d*,\d+(?:[eE][+-]?\d+)?\s*", cell))
+        points += bool(re.fullmatch(r"\s*[+\-\N{MINUS SIGN}]?\d*\.\d+(?:[eE][+-]?\d+)?\s*", cell))
     return "," if commas > points else "."
 
 

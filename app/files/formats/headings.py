@@ -6,15 +6,40 @@ from typing import NamedTuple
 
 from app.files.formats import delimited
 from app.files.formats.delimited import Row
+from app.files.formats.units import is_unit_column, length_unit
 
 TOP = 50  # rows in which the heading is looked for
+OTHER_UNITS = {
+    "",
+    "-",
+    "–",
+    "°",
+    "deg",
+    "grad",
+    "rad",
+    "%",
+    "s",
+    "min",
+    "h",
+    "n",
+    "kn",
+    "nm",
+    "kg",
+    "g",
+    "°c",
+    "bar",
+    "rpm",
+}
+"""Words of a row of units that are none of length."""
 
 
 class Heading(NamedTuple):
-    """The line of a heading, the last one where it has several, and the names of the columns."""
+    """The line of a heading, the last one with names; the names of the columns, and units in a row below them, in line `end`."""
 
     line: int
     names: tuple[str, ...]
+    units: tuple[str | None, ...] = ()
+    end: int = 0
 
 
 def heading(top: Sequence[Row], said: int | None = None, *, ragged: bool = False) -> Heading | None:
@@ -27,6 +52,8 @@ def heading(top: Sequence[Row], said: int | None = None, *, ragged: bool = False
     >>> rows = [Row(1, ["Time", "Lathe 1", "", "Lathe 2", ""]), Row(2, ["", "D35", "D40", "D35", "D41"])]
     >>> heading([*rows, Row(3, ["6:05", "35.001", "40.002", "35.003", "41"])]).names
     ('Time', 'Lathe 1 D35', 'D40', 'Lathe 2 D35', 'D41')
+    >>> heading([Row(1, ["Part", "D40"]), Row(2, ["", "[inch]"]), Row(3, ["P1", "1.57"])])
+    Heading(line=1, names=('Part', 'D40'), units=(None, 'inch'), end=2)
     """
     last = _last_head(top) if said is None else next((at for at, row in enumerate(top) if row.line == said), None)
     if last is None:
@@ -42,12 +69,23 @@ def heading(top: Sequence[Row], said: int | None = None, *, ragged: bool = False
             f"{group} {name}".strip() if name and names.count(name) > 1 else name
             for group, name in zip(across, names, strict=True)
         ]
-    return Heading(top[last].line, tuple(name.removeprefix("\ufeff") for name in names))
+    names = [name.removeprefix("\ufeff") for name in names]
+    below = as_wide(top[last + 1], width) if last + 1 < len(top) else None
+    if below is None or not _are_units(names, below.cells):
+        return Heading(top[last].line, tuple(names))
+    return Heading(top[last].line, tuple(names), tuple(map(length_unit, below.cells)), below.line)
 
 
 def as_wide(row: Row, width: int) -> Row:
     """A row with so many cells: cut off, or filled up with empty ones."""
     return row._replace(cells=row.cells[:width] + [""] * (width - len(row.cells)))
+
+
+def _are_units(names: Sequence[str], cells: Sequence[str]) -> bool:
+    """Tell of a row that has nothing but units, one of them of length."""
+    words = [(name, cell.strip(" []()")) for name, cell in zip(names, cells, strict=True) if cell.strip()]
+    lengths = any(length_unit(word) for name, word in words if not is_unit_column(name))
+    return lengths and all(length_unit(word) or word.lower() in OTHER_UNITS for _name, word in words)
 
 
 def _or_before(before: str, cell: str) -> str:

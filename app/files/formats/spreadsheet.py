@@ -17,7 +17,7 @@ from zipfile import BadZipFile, ZipFile
 
 from app.files.formats.cell_values import Unreadable
 from app.files.formats.delimited import Unusable
-from app.files.formats.units import length_unit
+from app.files.formats.units import length_unit, like_a_unit
 from app.language.i18n import _
 
 ENDINGS = {".xlsx", ".xlsm"}
@@ -36,6 +36,7 @@ _BROKEN = (
 _OF_THE_DISK = {errno.EFBIG, errno.ENOSPC, errno.EDQUOT}
 _LITERAL = re.compile(r'"([^"]*)"|\\(.)')  # in a number format
 _OWN_FORMATS = 164  # formats of a workbook's own are counted from here on
+_PERCENT = {9, 10}  # formats that need no code
 _PLAIN = str.maketrans({"\t": " ", "\r": " ", "\n": " "})
 Spend = Callable[[int], None]
 
@@ -43,10 +44,16 @@ Spend = Callable[[int], None]
 def texts(path: Path, folder: Path, stem: str, spend: Spend = lambda _bytes: None) -> dict[str, Path]:
     """Write each sheet that holds something as `stem.1.data`, `stem.2.data` … in the folder; their files by name of the sheet.
 
+    Hidden sheets come last.
+
     spend: is called with bytes before they are written. Raises `Unusable` for what is no workbook, or holds nothing.
     """
-    from openpyxl import load_workbook
-
+    try:
+        from openpyxl import load_workbook
+    except ModuleNotFoundError:
+        raise Unusable(
+            _("Workbooks need openpyxl, which is not installed here: install it, or save the sheet as CSV.")
+        ) from None
     _refuse_large(path)
     try:
         with path.open("rb") as file:
@@ -54,7 +61,7 @@ def texts(path: Path, folder: Path, stem: str, spend: Spend = lambda _bytes: Non
             _refuse_many(book.worksheets)
             written = {
                 sheet.title: _write(sheet, folder / f"{stem}.{number}.data", spend)
-                for number, sheet in enumerate(book.worksheets, 1)
+                for number, sheet in enumerate(sorted(book.worksheets, key=_is_hidden), 1)
             }
     except Unusable:
         raise
@@ -96,6 +103,10 @@ def _refuse_large(path: Path) -> None:
         ) from None
     if size > MOST_BYTES:
         raise Unusable(_("The workbook is too large. Save the sheet as CSV."))
+
+
+def _is_hidden(sheet: Any) -> bool:
+    return bool(sheet.sheet_state != "visible")
 
 
 def _refuse_many(sheets: Sequence[Any]) -> None:
@@ -159,7 +170,7 @@ def _write(sheet: Any, target: Path, spend: Spend) -> Path | None:
 
 
 class _Units:
-    """Units of length that number formats show behind their numbers, such as ``0.0000" in"``; none for mm, as numbers are."""
+    """Units that number formats show behind their numbers, such as ``0.0000" in"`` or ``0%``; none for mm, as numbers are."""
 
     def __init__(self) -> None:
         self._of_styles: dict[int, str] = {}
@@ -170,11 +181,26 @@ class _Units:
         if not style or isinstance(value, bool) or not isinstance(value, int | float):
             return ""
         if style not in self._of_styles:
-            format_ = book._cell_styles[style].numFmtId - _OWN_FORMATS  # noqa: SLF001 - openpyxl tells it no other way
-            code = book._number_formats[format_] if format_ >= 0 else ""  # noqa: SLF001
-            word = "".join(quoted or escaped for quoted, escaped in _LITERAL.findall(code.partition(";")[0])).strip()
-            self._of_styles[style] = f" {word}" if length_unit(word) not in {None, "mm"} else ""
+            number = book._cell_styles[style].numFmtId  # noqa: SLF001 - openpyxl tells it no other way
+            own = number - _OWN_FORMATS
+            code = book._number_formats[own] if own >= 0 else "%" * (number in _PERCENT)  # noqa: SLF001
+            word = unit_shown(code)
+            self._of_styles[style] = f" {word}" if word and length_unit(word) != "mm" else ""
         return self._of_styles[style]
+
+
+def unit_shown(code: str) -> str:
+    """The unit that a number format shows behind the number, of length or not; an empty text where it shows none.
+
+    >>> unit_shown('0.000"mm"'), unit_shown('0.0\\\\"'), unit_shown("0.00%"), unit_shown('0.0"°"'), unit_shown('"Ø"0.000" ok"')
+    ('mm', '"', '%', '°', '')
+    """
+    code = code.partition(";")[0]
+    behind = code[max(code.rfind(sign) for sign in "0#?") + 1 :]
+    word = "".join(quoted or escaped for quoted, escaped in _LITERAL.findall(behind)).strip()
+    if "%" in _LITERAL.sub("", behind):
+        return "%"
+    return word if length_unit(word) or like_a_unit(word) else ""
 
 
 def refuse_error(text: str) -> None:

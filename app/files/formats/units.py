@@ -1,7 +1,7 @@
 """Units of length, as files and headers of columns name them: one table for every door, so that no size becomes a silent mm."""
 
 import re
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from functools import lru_cache
 from typing import Any, Final, Literal, get_args
 
@@ -90,7 +90,7 @@ def unit_in(header: str) -> str | None:
         word = (square or round_ or angle).strip()
         if unit := length_unit(word):
             return unit
-        if _like_a_unit(word, least_doubt=bool(square)):
+        if like_a_unit(word, least_doubt=bool(square)):
             unknown = unknown or word
     if unknown is not None:
         raise UnknownUnit(unknown)
@@ -134,22 +134,47 @@ def agreed(unit: str | None, *words: Any) -> str | None:
     return unit
 
 
-_UNIT_COLUMNS: Final = frozenset(map(folded, NAMES["unit"]))
+@lru_cache(maxsize=4096)
+def _names(name: str, field: str) -> bool:
+    return folded(name) in _COLUMNS[field]
 
 
-@lru_cache(maxsize=1024)
+_COLUMNS: Final = {field: frozenset(map(folded, NAMES[field])) for field in ("unit", "nominal")}
+
+
 def is_unit_column(name: str) -> bool:
     """Tell of a column that names a unit for each row."""
-    return folded(name) in _UNIT_COLUMNS
+    return _names(name, "unit")
 
 
-def unit_beside(row: Mapping[Any, Any]) -> Any:
-    """The unit that a row names in a column of its own, or an object in a member; None where it has none.
+def beside(row: Mapping[Any, Any], field: Literal["unit", "nominal"]) -> Any:
+    """The unit or the nominal size that a row names in a column of its own, or an object in a member; None where it has none.
 
-    >>> unit_beside({"Actual": "0.4724", "Einheit": "Zoll"}), unit_beside({"Actual": "12"})
+    >>> beside({"Actual": "0.4724", "Einheit": "Zoll"}, "unit"), beside({"Actual": "12"}, "nominal")
     ('Zoll', None)
     """
-    return next((value for name, value in row.items() if is_unit_column(str(name))), None)
+    return next((value for name, value in row.items() if _names(str(name), field)), None)
+
+
+_TITLE: Final = re.compile(
+    r"\b(?:units?|einheit(?:en)?|jedinica|enota|единица|јединица)\s*[=:]\s*([^\s;,]+)", re.IGNORECASE
+)
+
+
+def unit_above(titles: Iterable[Sequence[str]]) -> str | None:
+    """The unit of length that the lines above a table say for all of it; None where they say none. titles: their cells.
+
+    >>> unit_above([["DIM LOC1= CIRCLE CIR1  UNITS=IN"]]), unit_above([["Part", "4711"], ["Einheit:", "", "µm"]])
+    ('inch', 'um')
+    """
+    for cells in titles:
+        for at, cell in enumerate(cells):
+            match = _TITLE.search(cell)
+            named = is_unit_column(cell.strip().rstrip(":= "))
+            word = match[1] if match else next((each for each in cells[at + 1 :] if each.strip()), "") if named else ""
+            if unit := length_unit(word):
+                return unit
+    return None
 
 
 def in_mm(value: Any, unit: str | None) -> Any:
@@ -161,7 +186,8 @@ def in_mm(value: Any, unit: str | None) -> Any:
     return round(value * scale, 9) if is_length and scale != 1.0 and abs(value) < _LARGEST else value
 
 
-def _like_a_unit(word: str, *, least_doubt: bool) -> bool:
+def like_a_unit(word: str, *, least_doubt: bool = False) -> bool:
+    """Tell of a word that may be a unit. least_doubt: it stands where units stand."""
     if not word or any(sign.isdigit() for sign in word) or len(word.split()) > 1:
         return False
     return least_doubt or (len(word) <= 4 and word.lower() not in _NO_UNITS)

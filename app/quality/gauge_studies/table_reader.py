@@ -13,7 +13,7 @@ from app.core.number_text import number_or_none
 from app.files.formats.cell_values import Unreadable as WrongUnit
 from app.files.formats.cell_values import folded
 from app.files.formats.column_names import NAMES
-from app.files.formats.units import LENGTHS, UnknownUnit, agreed, in_mm, unit_behind, unit_beside, unit_in
+from app.files.formats.units import LENGTHS, UnknownUnit, agreed, beside, in_mm, unit_behind, unit_in
 from app.language.i18n import _
 from app.language.numbers import as_typed
 
@@ -118,7 +118,7 @@ def sizes_in_mm(
                 raise Unreadable(0, place + 1, words.format(word=error.word, known=", ".join(LENGTHS))) from None
     converted = []
     for at, row in enumerate(body, 1):
-        said = unit_beside(dict(zip(heading or (), row, strict=False))) if sizes else None
+        said = beside(dict(zip(heading or (), row, strict=False)), "unit") if sizes else None
         cells = []
         for place, cell in enumerate(row):
             size, behind = unit_behind(cell)
@@ -155,7 +155,7 @@ def long_columns(heading: Sequence[str]) -> Long | None:
     if part is None or operator is None:
         return None
     others = tuple(
-        at for at, name in enumerate(heading) if at not in {part, operator} and unit_beside({name: ""}) is None
+        at for at, name in enumerate(heading) if at not in {part, operator} and beside({name: ""}, "unit") is None
     )
     sizes = others if size is None else (size,)
     return Long(part, operator, sizes) if sizes else None

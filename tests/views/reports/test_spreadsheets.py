@@ -9,7 +9,9 @@ import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
 from openpyxl import load_workbook
+from xlsxwriter import Workbook
 
+from app.files.documents.files.sheets import _Writing
 from app.files.formats.delimited import defused
 from tests.forked import inband
 from tests.shop import Shop
@@ -120,6 +122,15 @@ def test_xlsx_holds_them_as_texts(nasty: Shop) -> None:
 
 def cells_of(content: bytes) -> list[str]:
     return [cell for row in csv.reader(io.StringIO(content.decode("utf-8-sig"))) for cell in row]
+
+
+def test_names_of_sheets_are_those_that_spreadsheets_take() -> None:
+    with Workbook(io.BytesIO()) as book:
+        writing = _Writing(book)
+        titles = ("D40", "d40", "History", "'a'", "x" * 40, "x" * 41, "a/b:c", "", "'" * 3)
+        found = [writing.sheet(title).name for title in titles]
+    long = "x" * 31, "x" * 29 + "~2"
+    assert found == ["D40", "d40~2", "History~2", "a", *long, "a-b-c", "-", "-~2"]
 
 
 def test_csv_of_a_report_is_defused(nasty: Shop) -> None:

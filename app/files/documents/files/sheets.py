@@ -55,7 +55,7 @@ class _Writing:
 
     def __init__(self, book: Workbook) -> None:
         self.book = book
-        self.names: set[str] = set()
+        self.names: set[str] = {"history"}  # which spreadsheets keep for themselves
         self.title = book.add_format({"bold": True, "font_size": 16})
         self.heading = book.add_format({"bold": True, "font_size": 12, "bottom": 1})
         self.head = book.add_format({"bold": True, "bg_color": "#e4e7e8", "text_wrap": True, "valign": "top"})

@@ -14,11 +14,11 @@ from typing import Any, NamedTuple
 from zoneinfo import ZoneInfo
 
 from app.files.formats import cell_values, delimited, spreadsheet
-from app.files.formats.cell_values import Unreadable
+from app.files.formats.cell_values import Unreadable, same_number
 from app.files.formats.delimited import Row, Unusable
 from app.files.formats.units import agreed, in_mm, unit_behind
 from app.language.i18n import _
-from app.loop.readings.importing.layout import DRAWN, NO_DIGIT, ORIGIN, Layout, Wishes, look, named_in, rows_of
+from app.loop.readings.importing.layout import DRAWN, NO_DIGIT, ORIGIN, Layout, Wishes, look, named_in, rows_of, written
 from app.loop.readings.origin import Origin
 
 MOST_FLAWS = 200
@@ -152,7 +152,7 @@ def shown(value: Any) -> str:
 
 
 def _csv(path: Path, layouts: Sequence[Layout]) -> Iterator[Item]:
-    readers = [_readers(layout) for layout in layouts]
+    readers, nominal = [_readers(layout) for layout in layouts], dict[str, tuple[int, str]]()
     try:
         for row in rows_of(path, layouts[0]):
             if isinstance(row, Unusable):
@@ -166,8 +166,12 @@ def _csv(path: Path, layouts: Sequence[Layout]) -> Iterator[Item]:
             if (stranger := _stranger(row.line, row.cells, layouts)) is not None:
                 yield Item(0, row.line, stranger)
                 continue
+            other = _other_nominal(row.line, row.cells, layouts[0], nominal)
             for place, own in enumerate(layouts):
                 if not own.only or own.only == named_in(row.cells, own):
+                    if other is not None:
+                        yield Item(place, row.line, other)
+                        continue
                     yield from (Item(place, row.line, found) for found in _of_row(row, own, readers[place]))
     except Unusable as error:
         line = error.line or 0
@@ -179,6 +183,26 @@ def _stranger(line: int, cells: Sequence[Any], layouts: Sequence[Layout]) -> Pas
     if not layouts[0].only or (name := named_in(cells, layouts[0])) in {each.only for each in layouts}:
         return None
     return Passed(line, _("is of {name}, which is not chosen").format(name=repr(name)))
+
+
+def _other_nominal(line: int, cells: Sequence[Any], layout: Layout, first: dict[str, tuple[int, str]]) -> Flaw | None:
+    """The flaw of a row with another nominal size than the first row of its name has: it is another characteristic.
+
+    first: line and nominal size by name; those of this row are added.
+    """
+    said = " ".join(written(cells[place]) for place in layout.nominal)
+    if not said:
+        return None
+    name = named_in(cells, layout) if "characteristic" in layout.columns else ""
+    before, nominal = first.setdefault(name, (line, said))
+    if same_number(said, nominal):
+        return None
+    words = _(
+        "is another nominal size than line {first} has{name}: two characteristics of one name? Name the columns that "
+        "distinguish them (--map characteristic=Feature+Axis); if the drawing was changed, --map nominal="
+    )
+    column = "+".join(layout.header[place] for place in layout.nominal)
+    return Flaw(line, column, shown(said), words.format(first=before, name=f" ({shown(name)})" if name else ""))
 
 
 def _of_row(row: Row, layout: Layout, readers: Sequence["_Reader"]) -> Iterator["dict[str, Any] | Flaw | Passed"]:
@@ -290,13 +314,18 @@ def _context(text: str) -> Any:
 
 
 def _json(path: Path, layouts: Sequence[Layout]) -> Iterator[Item]:
+    nominal: dict[str, tuple[int, str]] = {}
     for number, value in objects(path, layouts[0].kind):
         cells = [value.get(name) for name in layouts[0].header] if isinstance(value, dict) else []
         if cells and (stranger := _stranger(number, cells, layouts)) is not None:
             yield Item(0, number, stranger)
             continue
+        other = _other_nominal(number, cells, layouts[0], nominal) if cells else None
         for place, layout in enumerate(layouts):
             if cells and layout.only and layout.only != named_in(cells, layout):
+                continue
+            if other is not None:
+                yield Item(place, number, other)
                 continue
             yield from (Item(place, number, found) for found in _of_object(number, value, layout))
 

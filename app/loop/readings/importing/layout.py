@@ -16,7 +16,7 @@ from app.files.formats.column_names import NAMES
 from app.files.formats.delimited import Row, Unusable
 from app.files.formats.file_times import FileTimes, times_of
 from app.files.formats.headings import TOP, as_wide, heading
-from app.files.formats.units import LENGTHS, UnknownUnit, unit_behind, unit_in
+from app.files.formats.units import LENGTHS, UnknownUnit, unit_above, unit_behind, unit_in
 from app.language.i18n import _
 from app.loop.readings.origin import COLUMNS
 
@@ -30,6 +30,7 @@ DRAWN = ("nominal", "upper", "lower", "natural_limit")
 """Fields of a characteristic, not of its readings: they set it up where it is missing."""
 MOST_NAMES = 1_000
 DATES = {"date", "datum", "дата", "датум"}
+AXES = {"axis", "ax", "achse", "osa", "os", "оса", "ось"}
 TIMES = {"time", "zeit", "uhrzeit", "vreme", "cas", "время", "време"}
 
 
@@ -73,6 +74,10 @@ class Layout:
     delimiter: str = ","
     decimal: str = "."
     said_unit: str | None = None  # of the column of sizes, by a person or its header; a row or a cell may say its own
+    units: tuple[
+        str | None, ...
+    ] = ()  # of columns whose header says none: in a row below it, or in the lines above the table
+    nominal: tuple[int, ...] = ()  # of the nominal size, which is one for all rows of a characteristic
     zone: ZoneInfo | None = None
     time_format: str | None = None
     header_line: int = 1
@@ -240,15 +245,21 @@ def _csv_layout(path: Path, wishes: Wishes, zone: ZoneInfo | None, kind: str = "
     if found is None:
         words = _("Line {n} is empty, or too far below to be the header of the columns.")
         raise wrong("header_line", words.format(n=wishes.header_line))
-    head, header = found
+    if wishes.header_line is None and not _fits(found.names, wishes.mapping):
+        others = (row for row in top if not any(map(delimited.is_value, row.cells)))
+        fitting = (row.line for row in others if _fits([cell.strip() for cell in row.cells], wishes.mapping))
+        found = heading(top, next(fitting, None), ragged=kind == "sheet") or found
+    head, header, units, end = found
     _refuse_wide(header)
-    first_line = max(head + 1, wishes.first_line or 0)
+    first_line = max(head + 1, end + 1, wishes.first_line or 0)
     columns = _columns(header, wishes.mapping)
     place = columns.get("measured", (0,))[0]
     # Where no column is the measured one, it may be any of them, or several.
     only = slice(place, place + 1) if "measured" in columns else slice(None)
     below = [row for row in chain(top, islice(rows, 200)) if row.line >= first_line]
     sample = [unit_behind(cell)[0] for row in below for cell in row.cells[only]]
+    above = unit_above(row.cells for row in top if row.line < head)
+    units = tuple(unit or above for unit in units or (None,) * len(header))
     made = Layout(
         kind=kind,
         header=header,
@@ -256,7 +267,9 @@ def _csv_layout(path: Path, wishes: Wishes, zone: ZoneInfo | None, kind: str = "
         encoding=encoding,
         delimiter=delimiter,
         decimal=wishes.decimal or delimited.decimal_of(sample),
-        said_unit=unit_of(header[place] if "measured" in columns else "", wishes.unit),
+        said_unit=(unit_of(header[place], wishes.unit) or units[place]) if "measured" in columns else wishes.unit,
+        units=units,
+        nominal=_nominal(header, columns, wishes.mapping),
         zone=zone,
         time_format=wishes.time_format,
         header_line=head,
@@ -282,13 +295,13 @@ def _times(layout: Layout, begin: Sequence[Row], rest: Iterator[Row]) -> FileTim
     if not places:
         return FileTimes()
 
-    def written(rows: Iterable[Row]) -> Iterator[str]:
+    def texts(rows: Iterable[Row]) -> Iterator[str]:
         return (text_of(row, places) for row in rows)
 
-    found = times_of(written(begin), layout.time_format)
-    if found.dated and (found.order is not None or not any(slashed(text) for text in written(begin))):
+    found = times_of(texts(begin), layout.time_format)
+    if found.dated and (found.order is not None or not any(slashed(text) for text in texts(begin))):
         return found
-    return times_of(written(chain(begin, rest)), layout.time_format)
+    return times_of(texts(chain(begin, rest)), layout.time_format)
 
 
 def text_of(row: Row, places: Sequence[int]) -> str:
@@ -306,7 +319,7 @@ def _drawn(layout: Layout, rows: Iterable[tuple[int, Sequence[Any]]]) -> dict[st
         if len(name) > LONGEST_NAME:
             raise wrong(f"{layout.named('characteristic')}, {_('line {line}').format(line=line)}", _long_name(name))
         nominal, upper, lower, natural, unit = (
-            " ".join(_written(cells[at]) for at in layout.columns.get(each, ())) for each in (*DRAWN, "unit")
+            " ".join(written(cells[at]) for at in layout.columns.get(each, ())) for each in (*DRAWN, "unit")
         )
         drawn = Drawn(line, nominal, upper, lower, natural, unit)
         first = found.setdefault(name, drawn)
@@ -321,10 +334,11 @@ def _drawn(layout: Layout, rows: Iterable[tuple[int, Sequence[Any]]]) -> dict[st
 
 def named_in(cells: Sequence[Any], layout: Layout) -> str:
     """The characteristic that a row names."""
-    return " ".join(_written(cells[place]) for place in layout.columns["characteristic"])
+    return " ".join(written(cells[place]) for place in layout.columns["characteristic"])
 
 
-def _written(cell: Any) -> str:
+def written(cell: Any) -> str:
+    """A cell as a text."""
     return "" if cell is None else str(cell).strip()
 
 
@@ -352,7 +366,13 @@ def _json_layout(path: Path, wishes: Wishes, zone: ZoneInfo | None, *, is_list: 
     columns = _columns(header, wishes.mapping)
     unit = unit_of(header[columns["measured"][0]] if "measured" in columns else "", wishes.unit)
     layout = Layout(
-        "list" if is_list else "lines", header, columns, said_unit=unit, zone=zone, time_format=wishes.time_format
+        "list" if is_list else "lines",
+        header,
+        columns,
+        said_unit=unit,
+        nominal=_nominal(header, columns, wishes.mapping),
+        zone=zone,
+        time_format=wishes.time_format,
     )
     if "characteristic" in columns:
         rows = ((at, [value.get(name) for name in header]) for at, value in _objects(path, is_list=is_list))
@@ -419,6 +439,23 @@ def _columns(header: tuple[str, ...], mapping: Mapping[str, str]) -> dict[str, t
     return {name: places for name, places in columns.items() if name not in DRAWN}
 
 
+def _fits(names: Sequence[str], mapping: Mapping[str, str]) -> bool:
+    """Tell of names that have the columns which a person names, and one that is measured."""
+    columns = [column for column in mapping.values() if column and not column.isdigit()]
+    named = all(column in names or all(part.strip() in names for part in column.split("+")) for column in columns)
+    return named and ("measured" in mapping or "measured" in _guesses(tuple(names)))
+
+
+def _nominal(
+    header: tuple[str, ...], columns: Mapping[str, tuple[int, ...]], mapping: Mapping[str, str]
+) -> tuple[int, ...]:
+    """The column of nominal sizes, also where they set nothing up; none where a person says so."""
+    if "nominal" in columns or "nominal" in mapping or "measured" not in columns:
+        return columns.get("nominal", ())
+    guess = _guesses(header).get("nominal", ())
+    return () if set(guess) & {place for places in columns.values() for place in places} else guess
+
+
 def _places(header: tuple[str, ...], column: str) -> tuple[int, ...] | None:
     """Return the place of a column: by its name or number, or two that belong together as Date+Time or 2+3."""
     place = _place(header, column)
@@ -457,8 +494,12 @@ def _guesses(header: tuple[str, ...]) -> dict[str, tuple[int, ...]]:
     unsigned = [at for at, name in enumerate(header) if is_unsigned(name)]
     if "lower" not in guesses and unsigned:
         guesses["lower"] = (unsigned[0],)
-    if "characteristic" not in guesses and "measured" in guesses and "id" in names and "nominal" in guesses:
-        guesses["characteristic"] = (names.index("id"),)
+    beside = next((at for at, each in enumerate(names) if each in AXES), None)
+    if "characteristic" in guesses and beside is not None:
+        guesses["characteristic"] += (beside,)  # a feature has several: X, Y, D
+    elif "characteristic" not in guesses and "measured" in guesses and "nominal" in guesses:
+        named = names.index("id") if "id" in names else beside
+        guesses |= {} if named is None else {"characteristic": (named,)}
     if set(COLUMNS) <= set(header):
         guesses |= {name: (header.index(name),) for name in ORIGIN}
     return guesses

@@ -68,7 +68,7 @@ def layout_of(layout: Layout, column: Column, unit: str | None) -> Layout:
     fields = {
         name: places for name, places in layout.columns.items() if name not in {"measured", "touches", "key", *ORIGIN}
     }
-    own_unit = unit_of(layout.header[column.place], unit)
+    own_unit = unit_of(layout.header[column.place], unit) or (layout.units[column.place] if layout.units else None)
     return replace(layout, columns=fields | {"measured": (column.place,)}, said_unit=own_unit, skips_blank=True)
 
 

@@ -19,10 +19,12 @@ import click
 import pytest
 import typer
 from openpyxl import Workbook
+from openpyxl.utils.datetime import MAC_EPOCH, WINDOWS_EPOCH
 
 from app.bridge import file_content
 from app.bridge.configuration import configuration_from
-from app.bridge.file_content import read_content
+from app.bridge.file_content import Entry, read_content
+from app.bridge.plausible import Target, far_off
 from app.cli import data
 from app.core.parameters import read
 from app.errors import InbandError
@@ -41,7 +43,13 @@ from tests.shop import Person, Shop
 
 ZONE = "Europe/Belgrade"
 D40: dict[str, Any] = {"target": 40.0, "tolerance_width": 0.1, "averaging_limit": 0.033333}
-LENGTHS = {"40": D40, "16": D40 | {"target": 16.0}, "2.167": D40 | {"target": 2.167}, "0": D40 | {"target": 0.0}}
+LENGTHS = {
+    "40": D40,
+    "0.1": D40 | {"target": 0.1, "tolerance_width": 0.2, "confidence_limit": 1.0},
+    "16": D40 | {"target": 16.0},
+    "2.167": D40 | {"target": 2.167},
+    "0": D40 | {"target": 0.0},
+}
 MORNING = "2025-11-18T05:0{}:00"
 Readings = list[tuple[float, str | None]]
 
@@ -62,6 +70,9 @@ class Case:
     encoding: str = "utf-8"
     words: str = ""  # in the refusal
     whole: bool = False  # refused as a whole, without a line
+    far: bool = False  # refused because no size is near the target, which the bridge's preview says
+    epoch: datetime = WINDOWS_EPOCH  # of a workbook
+    formats: dict[str, str] = field(default_factory=dict)  # of its cells
 
     @property
     def content(self) -> bytes:
@@ -69,10 +80,16 @@ class Case:
         if not self.cells:
             return self.text.encode(self.encoding)
         book, held = Workbook(), io.BytesIO()
+        book.epoch = self.epoch
         sheet = book.active
         assert sheet is not None
         for row in self.cells:
             sheet.append(row)
+        for place, shown in self.formats.items():
+            sheet[place].number_format = shown
+        notes = book.create_sheet("Notes", 0)
+        notes.append(["version", 3])
+        notes.sheet_state = "hidden"
         book.save(held)
         return held.getvalue()
 
@@ -173,13 +190,7 @@ TABLES = {
     "sep line": Case("sep=;\r\nTime;D40\r\n18.11.2025 06:05;40,001\r\n", morning(40.001)),
     "sep line and mark": Case("\ufeffsep=,\r\nTime,D40\r\n2025-11-18 06:05,40.001\r\n", morning(40.001)),
     "utf-16": Case("Zeit\tWert\r\n18.11.2025 06:05:00\t40,001\r\n", morning(40.001), encoding="utf-16"),
-    "month first": Case(
-        US,
-        [(40.001, "2025-11-18T05:05:10"), (40.002, "2025-11-18T17:06:10")],
-        cli={"time_format": "%m/%d/%Y %I:%M:%S %p"},
-        page={"time_format": "%m/%d/%Y %I:%M:%S %p"},
-        bridge={"times": "%m/%d/%Y %I:%M:%S %p"},
-    ),
+    "month first": Case(US, [(40.001, "2025-11-18T05:05:10"), (40.002, "2025-11-18T17:06:10")]),
     "two digits of a year": Case(
         GERMAN,
         [(40.001, "2025-11-18T05:05:11"), (39.998, "2025-11-18T05:06:12")],
@@ -188,6 +199,27 @@ TABLES = {
         bridge={"times": "%d.%m.%y %H:%M:%S"},
         encoding="cp1252",
     ),
+    "two digits without their form": Case(GERMAN, bad=(2, 3), words="%d.%m.%y", encoding="cp1252"),
+    "inches far from the target": Case(
+        UNIT.format("inch"), size="0.1", column="Run-out [inch]", far=True, words="lies more than 1 mm"
+    ),
+    "inches without a unit": Case("Time,D40\n2025-11-18 06:05,1.57480\n", far=True, words="lies more than 1 mm"),
+    "days of a spreadsheet": Case(
+        "Time,D40\n45979.25339,40.001\n",
+        [(40.001, "2025-11-18T05:04:52.896000")],
+        cli={"time_format": "days since 1899-12-30"},
+        page={"time_format": "days since 1899-12-30"},
+        bridge={"times": "days since 1899-12-30"},
+    ),
+    "closed by END": Case("Time\tD40\n18.11.2025 06:05\t40.001\nEND\n", morning(40.001)),
+    "a unit above": Case("Job;4711\nUnit:;inch\n\nTime;D40\n18.11.2025 06:05;1,57484\n", morning(40.000936)),
+    "a row of units": Case("Time;D40;Angle\n;[inch];°\n18.11.2025 06:05;1,57484;3\n", morning(40.000936)),
+    "two features of one name": Case(
+        "Time;Nominal;Measured\n18.11.2025 06:05;40;40,001\n18.11.2025 06:06;40,000;40,002\n18.11.2025 06:07;2;2,001\n",
+        bad=(4,),
+        words="two characteristics of one name",
+    ),
+    "one column": Case("D40\n40.0023\n39.9987\n", [(40.0023, None), (39.9987, None)]),
     "an hour that never was": Case("Zeit;Wert\n30.03.2025 02:30;40,001\n", bad=(2,), words="does not exist"),
     "an hour that was twice": Case(
         "Zeit;Wert\n26.10.2025 02:15;40,001\n26.10.2025 02:45;40,002\n", bad=(2, 3), words="+01:00"
@@ -220,6 +252,12 @@ BOOKS = {
     ),
     "workbook with a formula": Case(
         cells=[["Time", "D40"], [DAY, 40.001], [DAY, "=A1"], [DAY, "#N/A"]], bad=(3, 4), words="formula"
+    ),
+    "workbook with a share": Case(
+        cells=[["Time", "D40"], [DAY, 40.001]], bad=(2,), words="is not a number", formats={"B2": "0.0%"}
+    ),
+    "workbook of the Mac": Case(
+        cells=[["Time", "D40"], [DAY.replace(hour=6, minute=5), 40.001]], good=morning(40.001), epoch=MAC_EPOCH
     ),
     "workbook that is none": Case("Time;D40\n18.11.2025;40,001\n", whole=True, words="not an XLSX workbook"),
 }
@@ -324,7 +362,7 @@ def names_of(case: Case) -> tuple[list[str], str]:
     if case.cells:
         return ["Date", "Time"] if "Date" in case.cells[0] else ["Time"], "D40"
     rows = [line for line in case.text.replace("\ufeff", "").splitlines() if line and "sep=" not in line]
-    head = next(line for line in rows if not line.startswith(("Plate", "Date:")))
+    head = next(line for line in rows if not line.startswith(("Plate", "Date:", "Job", "Unit:")))
     cells = [cell.strip().strip('"') for cell in re.split(r"[;,\t]| {2,}", head.strip())]
     return cells, case.column or next(each for each in cells if each in {"D40", "Wert", "Value", "Measured", "Istmaß"})
 
@@ -335,7 +373,7 @@ def test_a_table_means_the_same_at_every_door(plant: Plant, tmp_path: Path, name
     path = tmp_path / f"{name.replace(' ', '-')}.{'xlsx' if name in BOOKS else 'csv'}"
     path.write_bytes(case.content)
     cells, column = names_of(case)
-    refused = bool(case.bad) or case.whole
+    refused = bool(case.bad) or case.whole or case.far
 
     by_command = plant.shop.another("cli", **LENGTHS[case.size])
     said = plant.command(path, characteristic=by_command, mapping=f"measured={column}", **case.cli)
@@ -362,10 +400,16 @@ def test_a_table_means_the_same_at_every_door(plant: Plant, tmp_path: Path, name
 
     at = next((each for each in TIMES if all(part in cells for part in each.split("+"))), None)
     columns = {"measured": column} | ({"measured_at": at} if at else {})
-    decimal = "." if re.search(r"[;,\t ]-?\d+\.\d{3,}\b", case.text) else ","
+    decimal = "." if re.search(r"(?m)(^|[;,\t ])-?\d+\.\d{3,}\b", case.text) else ","
     form = {"format": "xlsx"} if name in BOOKS else {"decimal": decimal}
     readings, faults, words = bridged(path, {"*": "x"}, columns=columns, **form, **case.bridge)
     assert refused or as_expected(readings, case)
+    if case.far:
+        entries = [
+            Entry(line, "*", {"characteristic": "x", "measured": size}, "") for line, (size, _at) in enumerate(readings)
+        ]
+        assert case.words in str(far_off(entries, {"x": Target(LENGTHS[case.size]["target"], 1.0)}))
+        return
     assert case.whole or sorted(set(faults)) == list(case.bad), words  # type: ignore[type-var]
     assert bool(faults) == refused
     assert case.words in words
@@ -478,6 +522,29 @@ def test_a_row_names_its_natural_limit(tmp_path: Path, cells: str, found: str) -
         assert found in content.not_new
     else:
         assert read(parameters_of(content))[0].natural_limit.value == found
+
+
+@pytest.mark.parametrize("door", ["command", "page", "rest"])
+def test_an_axis_beside_the_feature_belongs_to_its_name(plant: Plant, tmp_path: Path, door: str) -> None:
+    path, stem = tmp_path / "pcdmis.csv", plant.shop.another("loc").replace("-", "")
+    rows = (
+        f"{stem},{axis},{nominal},{size},0.01,0.01\n" for axis, nominal, size in (("X", 10, 10.003), ("D", 16, 16.004))
+    )
+    text = "Feature,Axis,Nominal,Meas,+Tol,-Tol\n" + "".join(rows)
+    path.write_text(text)
+    if door == "command":
+        assert plant.command(path, create_missing=True, machine=plant.shop.machine) == ""
+    elif door == "page":
+        assert plant.page(path, all="new", machine=plant.shop.machine) == ""
+    else:
+        assert plant.table(path, text, create_missing=True, machine=plant.shop.machine)["stored"] == 2
+    assert [plant.stored(f"{stem}-{axis}")[0][0] for axis in "xd"] == [10.003, 16.004]
+    names = {f"{stem} {axis}": axis.lower() for axis in "XD"}
+    columns = {"characteristic": "Feature+Axis", "measured": "Meas"}
+    assert [size for size, _at in bridged(path, names, columns=columns)[0]] == [10.003, 16.004]
+    faults = bridged(path, {stem: "x"}, columns={"characteristic": "Feature", "measured": "Meas"})[1:]
+    assert faults[0] == [3]
+    assert "two characteristics of one name" in faults[1]
 
 
 OBJECTS = [
@@ -604,3 +671,111 @@ def test_aqdef_means_the_same_at_every_door(plant: Plant, tmp_path: Path, name: 
     path, _key = doors["bridge"]
     readings, faults, words = bridged(path, {"D20": "d20"}, format="aqdef", others="skip")
     assert (readings, faults) == (good, []), words
+
+
+def test_an_hour_of_aqdef_that_never_was_is_refused_by_line_at_every_door(plant: Plant, tmp_path: Path) -> None:
+    path, part = tmp_path / "a.dfq", plant.shop.another("part").replace("-", "")
+    text = "\r\n".join([*described(row(20.001, "30.03.2025/02:30:00"), row(20.002, "30.03.2025/03:15:00")), ""])
+    path.write_bytes(text.replace("{part}", part).encode("latin-1"))
+    machine, said = plant.shop.machine, {"create_missing": True, "machine": plant.shop.machine}
+    refused = plant.shop.admin.post(
+        "/api/v1/readings/aqdef", json={"name": "a.dfq", "content": path.read_text(), **said}
+    )
+    _readings, faults, words = bridged(path, {"D20": "d20"}, format="aqdef")
+    assert faults == [10]
+    by_page = html.unescape(plant.page(path, all="new", machine=machine))
+    assert plant.command(path, create_missing=True, machine=machine) != ""
+    for answer in (by_page, refused.text, words):
+        assert "does not exist in Europe/Belgrade" in answer
+    assert "line 10" in refused.text
+    plant.shop.call("GET", f"/characteristics/{part}-d20", 404)
+
+
+CASES = Path(__file__).parent / "cases"
+RUN_OUT = {
+    "target": None,
+    "tolerance_width": None,
+    "nominal": 0,
+    "upper_deviation": 0.0127,
+    "lower_deviation": 0,
+    "averaging_limit": 0.004,
+    "tool_memory": 0,
+    "average_memory": 0,
+    "weighting_factor": 1,
+}
+
+
+def through_all_doors(plant: Plant, path: Path, **parameters: Any) -> str:
+    """The key of a characteristic with the readings of a file, after all doors found the same in it."""
+    written = [line.split(",") for line in path.read_text().splitlines()[1:]]
+    wanted = [(float(size), in_utc(at)) for at, size in written]
+    keys = [plant.shop.another(door, **parameters) for door in ("cli", "page", "rest")]
+    assert plant.command(path, characteristic=keys[0]) == plant.page(path, keys[1]) == ""
+    plant.table(path, path.read_text(), characteristic=keys[2])
+    for key in keys:
+        assert plant.stored(key) == wanted
+    readings, _lines, words = bridged(path, {"*": "x"}, columns={"measured": "Value", "measured_at": "Time"})
+    assert (readings, words) == (wanted, "")
+    return keys[2]
+
+
+def test_run_outs_of_a_file_are_judged_by_their_natural_limit(plant: Plant) -> None:
+    path = Path(__file__).parents[3] / "quality" / "capability" / "runout-half-normal.csv"
+    key = through_all_doors(plant, path, **RUN_OUT)
+    found = plant.shop.call("GET", f"/characteristics/{key}/capability?last=all")
+    assert round(found["percentiles"]["ppk"], 4) == 1.9398
+    assert round(found["ppk"]["value"], 4) == 2.4087
+    assert (found["natural_limit"], found["lower_limit"], found["cp"]) == ("lower", None, None)
+    assert {found[name]["below"] for name in ("ppm_within", "ppm_overall", "ppm_observed")} == {None}
+
+
+def test_rules_begin_again_with_the_baseline_of_a_file_that_shifts(plant: Plant) -> None:
+    key = through_all_doors(plant, CASES / "rebase-after-shift.csv", target=40.0, tolerance_width=0.1)
+    path = f"/characteristics/{key}"
+    part: dict[str, Any] = {"quantity": "deviation", "first_sequence": 101, "last_sequence": 160, "reason": "shift"}
+    frozen = plant.shop.call("POST", f"{path}/baselines", 201, **part)
+    assert (frozen["centre"], frozen["sigma"]) == pytest.approx((0.00614, 0.0020158), abs=6e-7)
+    rules = {"main": {f"nelson_{number}": "watch" for number in range(1, 9)}}
+    plant.shop.call("PUT", f"{path}/rules", rules=rules, reason="all")
+    shown = plant.shop.call("GET", f"{path}/control?first=101&last=60")
+    assert [(each["rule"], each["first"], each["last"]) for each in shown["signals"]] == [("nelson_6", 135, 138)]
+
+
+def test_a_gauge_study_with_one_row_a_reading_is_the_same_pasted_and_posted(plant: Plant) -> None:
+    """As readings of a part of another size it is refused at each door, as every such file is."""
+    path = CASES / "grr-long.csv"
+    text = path.read_text()
+    rows = [dict(zip(("part", "operator", "values"), line.split(","), strict=True)) for line in text.splitlines()[1:]]
+    posted = [each | {"values": [float(each["values"])]} for each in rows]
+    shop = plant.shop
+    settings: dict[str, Any] = {"gauge": "Probe", "characteristic": shop.characteristic}
+    shop.call("POST", "/gauge-studies", 201, kind="grr", rows=posted, **settings)
+    typed = settings | {"kind": "grr", "machine": shop.machine, "do": "store", "table": text}
+    plant.engineer.send("/gauges/new", **typed)
+    for study in shop.call("GET", f"/gauge-studies?machine={shop.machine}&limit=2")["items"]:
+        anova, ranges = study["grr"]
+        (tested,) = [each for each in anova["table"] if each["source"] == "interaction"]
+        assert (tested["f"], tested["p_value"]) == pytest.approx((0.5955, 0.767), abs=5e-4)
+        sigma = {each["name"]: each["sigma"] for each in anova["components"]}
+        wanted = {
+            "grr": 0.00103834,
+            "repeatability": 0.00103834,
+            "reproducibility": 0,
+            "part": 0.0157385,
+            "total": 0.0157727,
+        }
+        assert {name: sigma[name] for name in wanted} == pytest.approx(wanted, abs=5e-8)
+        assert (anova["pooled"], anova["ndc"]) == (True, 21)
+        shares = [
+            each["percent"] for method in (anova, ranges) for each in method["components"] if each["name"] == "grr"
+        ]
+        assert shares == pytest.approx([6.583, 6.685], abs=5e-4)
+    key = shop.another(
+        "part", **LENGTHS["16"]
+    )  # as readings: no size is near the target, and nothing says whose they are
+    assert "lies more than" in plant.command(path, characteristic=key)
+    assert "lies more than" in html.unescape(plant.page(path, key))
+    assert "lies more than" in str(plant.table(path, text, characteristic=key))
+    readings, _lines, _words = bridged(path, {"*": "x"}, columns={"measured": "Measurement"})
+    entries = [Entry(2, "*", {"characteristic": "x", "measured": size}, "") for size, _at in readings]
+    assert far_off(entries, {"x": Target(16.0, 1.0)})

@@ -146,6 +146,10 @@ def test_a_column_that_is_called_so_and_holds_no_units_can_be_left_out(tmp_path:
         ({"v": "0.4724 in"}, {"measured": "v"}, 11.99896),
         ({"v": 0.4724, "eu": "in"}, {"measured": "v", "unit": "eu"}, 11.99896),
         ({"v": 25.1, "unit": "Nm"}, {"measured": "v"}, NO_LENGTH),
+        ({"d": {"v [µm]": 12345}}, {"measured": "d.v [µm]"}, 12.345),
+        ({"v_inch": 0.4724}, {"measured": "v_inch"}, 11.99896),
+        ({"v_inch": 0.4724, "unit": "mm"}, {"measured": "v_inch"}, "nobody can tell which counts"),
+        ({"v [Nm]": 25.1}, {"measured": "v [Nm]"}, "unit Nm, in the name of the member, is no length"),
     ],
 )
 def test_messages_of_others(content: Any, fields: dict[str, str], expected: float | str) -> None:

@@ -173,12 +173,16 @@ def import_aqdef(
 
 def _refuse(chosen: Mapping[int, str], found: Mapping[int, Content]) -> None:
     if not chosen:
-        reasons = [f"{each.title}: {each.obstacle or each.not_new}" for each in found.values()]
+        against = [(each.line, each.title, each.obstacle or each.not_new) for each in found.values()]
         raise Invalid(
             _("None of the file's characteristics is chosen; say which is which."),
             errors=[
                 FieldError("characteristics", _("none is chosen")),
-                *(FieldError("file", reason) for reason in reasons[:20] if not reason.endswith(": ")),
+                *(
+                    FieldError(_("line {line}").format(line=line) if line else "file", f"{title}: {reason}")
+                    for line, title, reason in against[:20]
+                    if reason
+                ),
             ],
         )
     keys = Counter(key for key in chosen.values() if key != NEW)

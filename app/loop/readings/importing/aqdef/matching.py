@@ -27,6 +27,7 @@ class Content:
     """One characteristic of a file. Lengths in mm.
 
     unit: of the file's numbers. natural_limit: as the file says, None where it says nothing. obstacle: why it is not imported at all. not_new: why it cannot be set up out of the file.
+    line: the one that stands against it, else the first that describes it; 0 where none does.
     """
 
     index: int
@@ -43,6 +44,7 @@ class Content:
     remarks: tuple[str, ...] = ()
     machine: str = ""
     natural_limit: NaturalLimit | None = None
+    line: int = 0
 
     @property
     def title(self) -> str:
@@ -112,6 +114,7 @@ def _content(description: Description, each: Characteristic, unit: str | None) -
         tuple(said.remarks),
         machine,
         None if obstacle else natural,
+        each.lines.get("K2004" if each.counts else "K2142" if obstacle else "", min(each.lines.values(), default=0)),
     )
 
 

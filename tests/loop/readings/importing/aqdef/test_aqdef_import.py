@@ -298,10 +298,10 @@ def test_where_nothing_is_chosen_it_is_said_why(plant: Database, tmp_path: Path)
     lines += ["K2001/3 M8", "K2110/3 20", "K2111/3 30", "K2142/3 Nm"]
     with pytest.raises(Invalid) as refusal:
         run(plant, written(tmp_path / "a.dfq", lines))
-    assert [each.message for each in refusal.value.errors][1:] == [
-        "L1: it has no tolerance: K2111 is missing",
-        "W1: is not a length: its unit is '°' (K2142)",
-        "M8: is not a length: its unit is 'Nm' (K2142)",
+    assert [(each.field, each.message) for each in refusal.value.errors][1:] == [
+        ("line 2", "L1: it has no tolerance: K2111 is missing"),
+        ("line 6", "W1: is not a length: its unit is '°' (K2142)"),
+        ("line 11", "M8: is not a length: its unit is 'Nm' (K2142)"),
     ]
 
 
