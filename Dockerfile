@@ -17,7 +17,7 @@ RUN sed '/^# For extras/,$d' constraints.txt > server.txt \
     && pip install --require-hashes --no-deps -r building.txt
 
 COPY pyproject.toml LICENSE README.md ./
-COPY docs/reference/api-examples docs/reference/api-examples
+COPY docs docs
 COPY migrations migrations
 COPY frontend frontend
 COPY app app

@@ -9,6 +9,7 @@ import subprocess
 import sys
 import sysconfig
 import tarfile
+import tomllib
 import venv
 from collections.abc import Iterator, Sequence
 from pathlib import Path
@@ -298,6 +299,9 @@ class TestContainer:
         copied = {source for line in re.findall(r"^COPY (.+)$", first, re.MULTILINE) for source in line.split()[:-1]}
         sent = {line[1:] for line in (HOUSE / ".dockerignore").read_text().splitlines() if line.startswith("!")}
         assert copied == sent
+        project = tomllib.loads((HOUSE / "pyproject.toml").read_text())
+        for folder in project["tool"]["hatch"]["build"]["targets"]["wheel"]["only-include"]:
+            assert any(Path(folder).is_relative_to(each) for each in copied), f"{folder} is not in the image"
 
     @pytest.mark.parametrize(("to", "library"), [("server", "fastapi"), ("building", "hatchling")])
     def test_the_dockerfile_takes_the_libraries_by_hash(self, to: str, library: str) -> None:
