@@ -116,7 +116,7 @@ def run(
         watch(settings.data_dir)
         if beside is not None:
             threading.Thread(target=_once_ready, args=(settings, beside), daemon=True).start()
-        say(f"Inband: {settings.address}  (Ctrl-C ends it)")
+        threading.Thread(target=_say_address, args=(settings,), daemon=True).start()
         _serve(settings, listening, stack.close)
     log.info("Inband has ended")
     _leave_threads()
@@ -311,10 +311,23 @@ def _listen(settings: "Settings") -> socket.socket:
     return listening
 
 
+def _local_host(settings: "Settings") -> str:
+    return {"0.0.0.0": "127.0.0.1", "::": "::1"}.get(settings.host, settings.host)  # noqa: S104 - compared only
+
+
+def _say_address(settings: "Settings") -> None:
+    """Print the address as soon as connections to it are accepted."""
+    while True:
+        with suppress(OSError), socket.create_connection((_local_host(settings), settings.port), timeout=2):
+            break
+        time.sleep(0.05)
+    say(f"Inband: {settings.address}  (Ctrl-C ends it)")
+
+
 def _once_ready(settings: "Settings", beside: "Callable[[Settings], None]") -> None:
     import httpx
 
-    host = {"0.0.0.0": "127.0.0.1", "::": "::1"}.get(settings.host, settings.host)  # noqa: S104 - compared only
+    host = _local_host(settings)
     url = f"http://[{host}]" if ":" in host else f"http://{host}"
     while True:
         try:

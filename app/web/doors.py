@@ -74,7 +74,9 @@ def search_words() -> dict[str, str]:
         "tool": _("Tool"),
         "alarm": _("Alarm"),
         "report": _("Report"),
+        "person": _("Person"),
         "part": _("Part"),
         "note": _("Note"),
         "page": _("Page"),
+        "help": _("Help"),
     }

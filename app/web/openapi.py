@@ -63,7 +63,7 @@ TAGS = {
     "characteristics": "What is measured, by which R parameters it is judged, and its charts.",
     "statistics": "What a run of readings amounts to.",
     "control charts": "Baselines frozen on purpose, charts judged by them, run rules, and the signals that these gave.",
-    "search": "Machines, characteristics, tools, alarms, parts and pages by their names.",
+    "search": "Machines, characteristics, tools, alarms, parts, people, pages and help by their names.",
     "overview": "What needs attention first: every characteristic ranked, with the reasons.",
     "reports": "What is handed over about a characteristic and a period: JSON, PDF, XLSX, CSV; of many at once in the background.",
     "wear": "True wear behind the corrections, how long an edge will last, and whether a loop over-corrects.",

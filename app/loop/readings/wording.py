@@ -8,7 +8,7 @@ from app.core.decision.step import Code, average_of
 from app.core.parameters import Feature, Parameters
 from app.core.plausibility import looks_like_inches, looks_like_micrometres
 from app.core.probing import TouchError, Touches, measured_value
-from app.language.i18n import _
+from app.language.i18n import _, ngettext
 from app.loop.readings.records import MOST_OUTSTANDING, Record
 
 NAMED_AT_MOST = 3
@@ -217,9 +217,12 @@ def _touch_fault(parameters: Parameters, touches: Touches | None) -> str:
 def _note(code: str, record: Record, parameters: Parameters) -> str:
     match code:
         case "outstanding":
-            numbers = _listed(record.outstanding or ())
-            return _(
-                "The part was cut before correction %(numbers)s took effect: its deviation of %(raw)s counts as %(decided)s."
+            outstanding = record.outstanding or ()
+            numbers = _listed(outstanding)
+            return ngettext(
+                "The part was cut before correction %(numbers)s took effect: its deviation of %(raw)s counts as %(decided)s.",
+                "The part was cut before corrections %(numbers)s took effect: its deviation of %(raw)s counts as %(decided)s.",
+                len(outstanding),
             ) % {"numbers": numbers, "raw": um(record.deviation), "decided": um(record.decided)}
         case "corrections_of_tool":
             return _(

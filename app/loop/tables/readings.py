@@ -28,6 +28,8 @@ from app.db.base import Base
 
 PART_BEGINS = (3, 8)
 """Letters at the beginning of a part's name that are found by an index."""
+PART_ENDS = (4, 7)
+"""The same at its end, where people read serial numbers."""
 _BLOCK_RANGES = {"pages_per_range": 64, "autosummarize": "on"}
 
 
@@ -100,6 +102,13 @@ class Reading(Base):
                 "first_3": "text_bloom_ops (n_distinct_per_range = 64)",
                 "first_8": "text_bloom_ops (n_distinct_per_range = 600)",
             },
+            postgresql_with=_BLOCK_RANGES,
+        ),
+        Index(
+            "reading_part_end_idx",
+            *(literal_column(f'"right"(part, {letters})').label(f"last_{letters}") for letters in PART_ENDS),
+            postgresql_using="brin",
+            postgresql_ops={f"last_{letters}": "text_bloom_ops (n_distinct_per_range = 2500)" for letters in PART_ENDS},
             postgresql_with=_BLOCK_RANGES,
         ),
     )

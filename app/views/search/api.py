@@ -18,13 +18,13 @@ class SearchHit(BaseModel):
     """Something that bears the name that was searched."""
 
     kind: Annotated[queries.Kind, Field(description="Kind of thing.")]
-    key: Annotated[str, Field(description="What programs call it; of a part its name, of a page its path.")]
+    key: Annotated[str, Field(description="What programs call it; of a part or a person its name, of a page its path.")]
     title: Annotated[str, Field(description="What people call it.")]
     path: Annotated[str, Field(description="Its page.")]
 
 
 class SearchOut(BaseModel):
-    """Results of a search: of each kind the best few, machines first, pages last."""
+    """Results of a search: of each kind the best few; first what is called so, then what begins so, then the rest."""
 
     items: list[SearchHit]
 
@@ -36,14 +36,15 @@ def search(
     q: Annotated[
         Part,
         Query(
-            description="Part of a name, a number of a tool or an alarm, or how a part's name begins.",
+            description="Words of a name, a number of a tool or an alarm, or how a part's name begins or ends.",
             examples=["shaft"],
         ),
     ],
 ) -> SearchOut:
-    """Machines, characteristics, tools, alarms, parts and pages by their names, notes by their words.
+    """Machines, characteristics, tools, alarms, parts and pages by their names, notes and help by their words, people (admin).
 
-    Parts are found by their whole name, or by its first three letters or more among the newest half a million readings;
-    *report* before a name finds the report of a characteristic.
+    Every word has to occur; blanks, hyphens, dots and Ø do not count, so that *bore 30* finds *Bore Ø30 H7* and *lathe1* finds
+    *lathe-1*. Parts are found by their whole name, or by its first or last three letters or more among the newest half a million
+    readings; *report* before a name finds the report of a characteristic.
     """
     return SearchOut.model_validate({"items": [hit._asdict() for hit in queries.hits(session, q, caller)]})

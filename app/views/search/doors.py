@@ -59,6 +59,8 @@ def doors() -> list[Door]:
         Door(_("Background jobs"), "/setup/jobs", _("periodic jobs, failing"), "engineer"),
         Door(_("Proof"), "/proof", _("published examples, validation")),
         Door(_("Licences"), "/licences", _("libraries, versions, SBOM, open source")),
+        Door(_("Help"), "/help", _("manual, instructions, how-to, documentation")),
+        Door(_("Glossary"), "/help/reference/glossary", _("terms, R numbers, abbreviations")),
         Door(_("Account"), "/account", _("password, sign out")),
         Door(_("API"), "/api/docs", _("REST, OpenAPI, program")),
     ]

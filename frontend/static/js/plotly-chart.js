@@ -23,7 +23,7 @@ import { courseOf, extentOf, fetchFigure, isMovable, isThinned, withRange } from
 import { subscribe } from "./live.js";
 import { loadPlotly } from "./plotly-library.js";
 
-const CONFIG = { displayModeBar: false, displaylogo: false, responsive: true, scrollZoom: false };
+const CONFIG = { displayModeBar: false, displaylogo: false, responsive: true, scrollZoom: false, showTips: false };
 const LONG = 50; // points; below fewer there is no strip until a part of them is shown
 const PAPER = 860; // px
 const SETTLED = 250; // ms after the last change of the view finer data is fetched
@@ -66,6 +66,7 @@ class PlotlyChart extends HTMLElement {
   build() {
     this.words = document.querySelector('meta[name="plotly"]').dataset;
     this.plot = this.appendChild(Object.assign(document.createElement("div"), { className: "plot" }));
+    this.plot.dataset.waiting = this.words.drawing; // shown while nothing is drawn (charts.css)
     this.plot.setAttribute("role", "img");
     this.plot.setAttribute("aria-label", this.getAttribute("label") ?? "");
     this.setAttribute("role", "group");

@@ -43,19 +43,52 @@ def test_by_name_key_number_and_beginning(searched: Shop) -> None:
     assert ("tool", f"{searched.machine}/3") in found(searched, "tool 3")
     assert ("alarm", alarm) in found(searched, alarm)
     assert ("alarm", alarm) in found(searched, "worn")
-    assert ("part", "Serial-0001") not in found(searched, "erial"), "parts are found by the beginning of their name"
-    assert found(searched, "Serial-0") == [("part", "Serial-0001"), ("part", "Serial-0002")]
+    assert ("part", "Serial-0001") not in found(searched, "erial"), (
+        "parts are found by the beginning or the end of their name"
+    )
+    assert found(searched, "0002") == [("part", "Serial-0002")]
+    assert ("part", "Serial-0002") in found(searched, "002"), "shorter than the index knows"
+    assert ("part", "Serial-0002") in found(searched, "AL-0002"), "in other letters"
+    assert found(searched, "Serial-0")[:2] == [("part", "Serial-0001"), ("part", "Serial-0002")]
     assert found(searched, ODD) == [("part", ODD)]
-    assert found(searched, "cpk") == [("page", "/overview")]
-    assert found(searched, "probe calibration") == [("page", "/calibration")]
+    assert found(searched, "cpk")[0] == ("help", "/help/reference/glossary#term-cpk")
+    assert ("page", "/overview") in found(searched, "cpk")
+    assert ("page", "/calibration") in found(searched, "probe calibration")
     assert found(searched, "%") == [("page", "/gauges")], "%GRR, and no wildcard"
     for nothing in ("_", "zzzz", "9" * 60):
         assert found(searched, nothing) == []
 
 
+def test_as_people_type_it(searched: Shop) -> None:
+    number = searched.machine.removeprefix("lathe-")
+    key = searched.another("seat", tool_memory=7)
+    searched.call("PATCH", f"/machines/{searched.machine}/tools/7", name="Finishing tool")
+    searched.call("PATCH", f"/characteristics/{key}", name="Bearing seat Ø40 h6")
+    bore = searched.another("bore", tool_memory=0, average_memory=0)
+    searched.call("PATCH", f"/characteristics/{bore}", name="Bore Ø30 H7")
+    for typed in ("bore 30", "BORE Ø30", "30 bore", "bore30", f"bore 30 lathe{number}", bore.replace("-", "")):
+        assert found(searched, typed)[0] == ("characteristic", bore), typed
+    for typed in ("seat 40", "bearing seat 40", "seat h6"):
+        assert found(searched, typed)[0] == ("characteristic", key), typed
+    assert ("report", bore) in found(searched, "report bore 30")
+    for typed in (f"lathe{number}", f"Lathe {number}", f"LATHE-{number}"):
+        assert found(searched, typed)[0] == ("machine", searched.machine), typed
+    for typed in (f"t7 lathe{number}", f"lathe {number} tool 7", "finishing", f"finishing lathe{number}"):
+        assert ("tool", f"{searched.machine}/7") in found(searched, typed), typed
+    alarm = str(searched.alarms()[0]["id"])
+    assert ("alarm", alarm) in found(searched, f"worn lathe{number}")
+    assert ("alarm", alarm) not in found(searched, "worn mill-99")
+    assert ("help", "/help/how-to/run-rules") in found(searched, "switch rules")
+    assert ("help", "/help/how-to/back-up") in found(searched, "restore back-up")
+    assert ("page", "/help") in found(searched, "manual")
+
+
 def test_rights(searched: Shop, server: Server) -> None:
     assert ("page", "/setup/people") in found(searched, "people")
     assert ("page", "/setup/people") not in found(searched, "people", server.client(server.key("viewer")))
+    person = Person(server, "viewer")
+    assert found(searched, person.name.upper())[0] == ("person", person.name)
+    assert ("person", person.name) not in found(searched, person.name, person.browser)
     assert searched.machine_client.get("/api/v1/search?q=a").status_code == 403
     assert searched.admin.get("/api/v1/search").status_code == 422
     assert searched.admin.get("/api/v1/search?q=a%00").status_code == 422
