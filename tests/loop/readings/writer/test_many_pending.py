@@ -119,7 +119,7 @@ def test_of_very_many_the_first_are_stored_and_all_count() -> None:
     record = verdict.record()
     assert list(record.outstanding or ()) == list(range(1, MOST_OUTSTANDING + 1))
     assert (record.deviation, record.decided) == (0.013, 0.003)
-    assert "before correction 1, 2, 3 and at least 97 more took effect" in reason(record, verdict.parameters)["text"]
+    assert "before corrections 1, 2, 3 and at least 97 more took effect" in reason(record, verdict.parameters)["text"]
 
 
 def test_readings_share_the_numbers_and_each_keeps_its_own_count() -> None:
