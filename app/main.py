@@ -91,9 +91,13 @@ from app.quality.control_charts import (
 from app.quality.control_charts import pages as control_pages
 from app.quality.gauge_studies import api as gauge_studies
 from app.quality.gauge_studies import pages as gauge_pages
+from app.quality.ledger import api as ledger
+from app.quality.ledger import pages as ledger_pages
 from app.quality.proof import api as proof
 from app.quality.proof import pages as proof_pages
 from app.quality.proof import queries as proofs
+from app.quality.trial import api as trial
+from app.quality.trial import pages as trial_pages
 from app.quality.wear import actions as wear_actions
 from app.quality.wear import api as wear
 from app.quality.what_if import api as what_if
@@ -159,6 +163,8 @@ ROUTERS: tuple[APIRouter, ...] = (
     counts_api.router,
     rules_api.router,
     what_if.router,
+    ledger.router,
+    trial.router,
     signals_api.router,
     readings.push,
     reading_list.router,
@@ -201,6 +207,8 @@ ROUTERS: tuple[APIRouter, ...] = (
     counts_pages.router,
     rules_pages.router,
     what_if_pages.router,
+    ledger_pages.router,
+    trial_pages.router,
     signals_pages.router,
     capability_pages.router,
     six_pack.router,

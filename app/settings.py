@@ -273,6 +273,11 @@ class Settings(BaseSettings):
         description="Days on which the plant does not work, such as 2026-12-24,2026-12-31: for notifications.",
     )
 
+    part_cost: float | None = Field(
+        default=None, gt=0, le=1e9, description="Cost of a rejected part: the ledger counts in money then."
+    )
+    currency: str = Field(default="EUR", pattern="^[A-Z]{3}$", description="Currency of INBAND_PART_COST, such as EUR.")
+
     log_level: Literal["debug", "info", "warning", "error"] = Field(
         default="info", description="The least that is logged: debug, info, warning or error."
     )

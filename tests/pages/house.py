@@ -90,6 +90,12 @@ PAGES = {
         "/characteristics/{characteristic}-watched/what-if?r34=6",
         "/characteristics/{characteristic}-empty/what-if",
     ],
+    "/characteristics/{characteristic}/trial": [
+        "/characteristics/{characteristic}/trial",
+        "/characteristics/{characteristic}-empty/trial",
+    ],
+    "/characteristics/{characteristic}/trial/start": ["/characteristics/{characteristic}/trial/start"],
+    "/ledger": ["/ledger", "/ledger?machine={machine}"],
     "/proposals": ["/proposals", "/proposals?status=all"],
     "/proposals/{number}": ["/proposals/{proposal}"],
     "/alarms": ["/alarms", "/alarms?machine={machine}"],

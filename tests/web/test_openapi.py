@@ -349,6 +349,7 @@ FORMS: dict[str, tuple[str, ...] | None] = {
     "/account/pin": None,
     "/alarms/{number}/acknowledge": ("acknowledge_alarm",),
     "/alarms/{number}/affected": ("set_parts_aside",),
+    "/characteristics/{characteristic}/trial/start": ("start_correcting",),
     "/quarantines/{number}/parts/{part}/{what}": ("measure_part_again", "release_part", "scrap_part"),
     "/alignments/new": ("align",),
     "/alignments/pallets/new": ("compose_pallet",),

@@ -26,11 +26,26 @@ from app.loop.characteristics import wording
 from app.loop.characteristics.queries import CurrentCharacteristic
 from app.loop.summaries.queries import Window
 from app.loop.tables.tools import Correction
+from app.quality.what_if import map_axes
 from app.quality.what_if.proposals import count_open, proposals
 from app.quality.what_if.tool_history import HELD, ToolHistory, past_of
-from app.quality.what_if.turn_limit import on_all_cores
+from app.quality.what_if.turn_limit import on_all_cores, turn
 
-__all__ = ["USUAL", "Map", "Settings", "Simulation", "count_open", "map_of", "proposals", "side_by_side"]
+__all__ = [
+    "USUAL",
+    "Map",
+    "Settings",
+    "Simulation",
+    "ToolHistory",
+    "count_open",
+    "map_axes",
+    "map_of",
+    "on_all_cores",
+    "past_of",
+    "proposals",
+    "side_by_side",
+    "turn",
+]
 
 USUAL = USUAL_READINGS  # that are replayed unless somebody says otherwise
 SETTINGS = ("zero_range", "averaging_limit", "weighting_factor", "factor")

@@ -36,6 +36,9 @@ def doors() -> list[Door]:
             _("p, np, c, u, Laney, attributes, rejected parts, nonconformities; counts are typed in, not stored"),
         ),
         Door(_("Compare"), "/compare", _("side by side, small multiples, before and after, versions, tools, periods")),
+        Door(
+            _("Ledger"), "/ledger", _("savings, what corrections were worth, cost of rejects, money, over-correction")
+        ),
         Door(_("Gauge studies"), "/gauges", _("Cg, Cgk, %GRR, ndc, R&R, bias, linearity, measuring system, MSA")),
         Door(_("Reports"), "/reports", _("PDF, spreadsheet, XLSX, CSV, hand over")),
         Door(_("Find a part"), "/parts", _("serial number, part")),
