@@ -50,19 +50,19 @@ def money_of(found: Tally, part_cost: float | None) -> float | None:
     return None if part_cost is None or found.worth is Worth.NEITHER else round(found.net * part_cost, 2)
 
 
-class WeekOut(TallyOut):
+class LedgerWeekOut(TallyOut):
     """One week."""
 
     week: Annotated[date, Field(description="Its Monday, by the plant's clock.")]
 
 
-class ToolOut(TallyOut):
+class LedgerToolOut(TallyOut):
     """One tool."""
 
     tool_memory: Annotated[int, Field(description="R10.")]
 
 
-class CharacteristicOut(TallyOut):
+class LedgerCharacteristicOut(TallyOut):
     """One characteristic."""
 
     characteristic: str
@@ -79,9 +79,9 @@ class LedgerOut(BaseModel):
     part_cost: Annotated[float | None, Field(description="Cost of a rejected part; null: not set (INBAND_PART_COST).")]
     currency: Annotated[str, Field(description="Of all money (INBAND_CURRENCY).")]
     total: Annotated[TallyOut, Field(description="A part that two characteristics reject counts at each.")]
-    weeks: Annotated[list[WeekOut], Field(description="The newest first.")]
-    tools: list[ToolOut]
-    characteristics: list[CharacteristicOut]
+    weeks: Annotated[list[LedgerWeekOut], Field(description="The newest first.")]
+    tools: list[LedgerToolOut]
+    characteristics: list[LedgerCharacteristicOut]
 
     @classmethod
     def of(cls, found: Ledger, part_cost: float | None, currency: str) -> Self:
@@ -97,10 +97,12 @@ class LedgerOut(BaseModel):
             part_cost=part_cost,
             currency=currency,
             total=TallyOut.of(found.total, part_cost),
-            weeks=[WeekOut.model_validate(row(each) | {"week": local(week).date()}) for week, each in found.by_week()],
-            tools=[ToolOut.model_validate(row(each) | {"tool_memory": tool}) for tool, each in found.by_tool()],
+            weeks=[
+                LedgerWeekOut.model_validate(row(each) | {"week": local(week).date()}) for week, each in found.by_week()
+            ],
+            tools=[LedgerToolOut.model_validate(row(each) | {"tool_memory": tool}) for tool, each in found.by_tool()],
             characteristics=[
-                CharacteristicOut.model_validate(
+                LedgerCharacteristicOut.model_validate(
                     row(each.tally) | {"characteristic": each.key, "tool_memory": each.tool, "unknown": each.unknown}
                 )
                 for each in found.characteristics
