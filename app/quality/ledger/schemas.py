@@ -80,8 +80,8 @@ class LedgerOut(BaseModel):
     currency: Annotated[str, Field(description="Of all money (INBAND_CURRENCY).")]
     total: Annotated[TallyOut, Field(description="A part that two characteristics reject counts at each.")]
     weeks: Annotated[list[LedgerWeekOut], Field(description="The newest first.")]
-    tools: list[LedgerToolOut]
-    characteristics: list[LedgerCharacteristicOut]
+    tools: Annotated[list[LedgerToolOut], Field(description="By tool.")]
+    characteristics: Annotated[list[LedgerCharacteristicOut], Field(description="By characteristic.")]
 
     @classmethod
     def of(cls, found: Ledger, part_cost: float | None, currency: str) -> Self:
