@@ -22,6 +22,8 @@ _BEHIND: tuple[tuple[str, str], ...] = (
     (r"/characteristics/[^/]+/control(/.*)?|/count-charts", "how-to/control-charts"),
     (r"/characteristics/[^/]+/(rules|signals)|/signals/.*", "how-to/run-rules"),
     (r"/characteristics/[^/]+/capability|/overview", "how-to/capability"),
+    (r"/characteristics/[^/]+/trial(/.*)?", "how-to/shadow-trial"),
+    (r"/ledger", "how-to/ledger"),
     (r"/characteristics/[^/]+/what-if|/proposals(/.*)?", "how-to/what-if"),
     (r"/characteristics/[^/]+/report|/reports", "how-to/reports"),
     (r"/characteristics/[^/]+/readings/.*", "reference/decision"),
