@@ -15,7 +15,6 @@ from app.loop.connections import actions, bridge_text, queries, wording
 from app.loop.connections.bridge_text import Known
 from app.loop.connections.touch_tests.queries import touch_tests
 from app.loop.machines import queries as machines
-from app.loop.tables.machines import Machine
 from app.settings import Settings
 from app.web.deps import AddressDep, SessionDep, Sought, Word
 from app.web.paging import address, part_of
@@ -60,7 +59,7 @@ def connection_page(
         row=queries.find_connection(session, chosen.id),
         kind=shown_kind,
         bridge_kinds=bridge_text.kinds(),
-        configuration=bridge_text.configuration(shown_kind, _known(session, chosen, address_here)),
+        configuration=bridge_text.configuration(shown_kind, _known(session, chosen.id, chosen.key, address_here)),
         tests=touch_tests(session, chosen),
         wording=wording,
         silent_after=_silent_after(request),
@@ -68,10 +67,10 @@ def connection_page(
     )
 
 
-def _known(session: Session, machine: Machine, server: str) -> Known:
-    measured = characteristics.characteristics(session, machine_id=machine.id)
+def _known(session: Session, machine_id: int, machine: str, server: str) -> Known:
+    measured = characteristics.characteristics(session, machine_id=machine_id)
     tools = {each.parameters.tool_memory for each in measured if not each.parameters.measures_only}
-    return Known(machine.key, server, [each.characteristic.key for each in measured], sorted(tools), plant_zone().key)
+    return Known(machine, server, [each.characteristic.key for each in measured], sorted(tools), plant_zone().key)
 
 
 @router.post("/machines/{machine}/connection/remove")

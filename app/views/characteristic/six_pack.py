@@ -24,8 +24,6 @@ from app.quality.control_charts import charts
 from app.quality.control_charts import queries as controls
 from app.quality.control_charts import wording as control_wording
 from app.quality.control_charts.figures import control_figure
-from app.quality.control_charts.tables import Baseline
-from app.quality.control_charts.view import View
 from app.quality.proof import queries as proof
 from app.quality.proof import wording as proof_wording
 from app.web.choice import ChosenOnPage
@@ -75,7 +73,7 @@ def six_pack_page(request: Request, session: SessionDep, characteristic: str, ch
         parameters=current.parameters,
         study=study,
         baseline=baseline,
-        sixths=sixths(session, current, study, baseline),
+        sixths=sixths(session, current, study),
         rows=rows_of(study),
         interval=interval,
         wording=wording,
@@ -88,7 +86,7 @@ def six_pack_page(request: Request, session: SessionDep, characteristic: str, ch
     )
 
 
-def sixths(session: Session, current: CurrentCharacteristic, study: Study, baseline: Baseline | None) -> list[Sixth]:
+def sixths(session: Session, current: CurrentCharacteristic, study: Study) -> list[Sixth]:
     """The five pictures that are charts, in the order in which they are read; the sixth is the table of indices."""
     key = current.characteristic.key
     control, capability = f"/characteristics/{key}/control", f"/characteristics/{key}/capability"
@@ -97,9 +95,9 @@ def sixths(session: Session, current: CurrentCharacteristic, study: Study, basel
             name,
             name,
             control,
-            replace(_control(view, key), room=Room(62, 78 if view.centre is not None else 14, 40, 14)),
+            replace(chart, room=Room(62, 78 if has_limits else 14, 40, 14)),
         )
-        for name, view in _views(session, current, study, baseline)
+        for name, chart, has_limits in _control(session, current, study)
     ]
     shape = drawn(study)
     spread, line = figures.histogram(shape), figures.probability(shape)
@@ -116,22 +114,20 @@ def sixths(session: Session, current: CurrentCharacteristic, study: Study, basel
     ]
 
 
-def _control(view: View, key: str) -> Chart:
-    return control_figure(view, key=key, width=620)
-
-
-def _views(
-    session: Session, current: CurrentCharacteristic, study: Study, baseline: Baseline | None
-) -> list[tuple[str, View]]:
-    """The pair of charts by the frozen baseline; without one the readings as they are."""
+def _control(session: Session, current: CurrentCharacteristic, study: Study) -> list[tuple[str, Chart, bool]]:
+    """The pair of charts by the frozen baseline, and whether each has limits; without one the readings as they are."""
+    baseline = controls.baseline_in_force(session, current.characteristic)
     if baseline is None:
         plain = charts.unjudged(session, current, study.window)
-        return [(_("Deviations, no baseline"), plain), (_("Moving range, no baseline"), charts.unjudged_ranges(plain))]
-    kinds = [kind for kind in charts.kinds(baseline) if kind not in charts.REMEMBERING]
-    views = [charts.view(session, current, baseline, study.window, kind) for kind in kinds]
-    if baseline.quantity == Quantity.DIFFERENCES:
-        views.append(charts.unjudged_ranges(views[0]))
-    return [(control_wording.chart_name(view.kind), view) for view in views]
+        named = [(_("Deviations, no baseline"), plain), (_("Moving range, no baseline"), charts.unjudged_ranges(plain))]
+    else:
+        kinds = [kind for kind in charts.kinds(baseline) if kind not in charts.REMEMBERING]
+        views = [charts.view(session, current, baseline, study.window, kind) for kind in kinds]
+        if baseline.quantity == Quantity.DIFFERENCES:
+            views.append(charts.unjudged_ranges(views[0]))
+        named = [(control_wording.chart_name(view.kind), view) for view in views]
+    key = current.characteristic.key
+    return [(name, control_figure(view, key=key, width=620), view.centre is not None) for name, view in named]
 
 
 def last_readings(study: Study) -> Chart:

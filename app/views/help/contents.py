@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 from app.language.i18n import _
-from app.views.help.documents import HELP, documents
+from app.views.help.queries import HELP, documents
 
 
 class Group(NamedTuple):

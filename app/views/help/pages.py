@@ -7,7 +7,7 @@ from app.access.deps import require
 from app.errors import NotFound
 from app.language.i18n import _
 from app.views.help.contents import groups
-from app.views.help.documents import document, documents, files
+from app.views.help.queries import document, documents, files
 from app.web.templates import page
 from app.web.terms import DOCS
 

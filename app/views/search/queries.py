@@ -17,7 +17,7 @@ from app.loop.tables.characteristics import Characteristic
 from app.loop.tables.machines import Machine
 from app.loop.tables.readings import PART_BEGINS, PART_ENDS, Reading, Stream
 from app.loop.tables.tools import Tool
-from app.views.help.documents import Section, sections
+from app.views.help.queries import Section, sections
 from app.views.search import readings
 from app.views.search.doors import doors
 from app.views.search.parts import part_path

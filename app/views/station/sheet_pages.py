@@ -12,7 +12,7 @@ from app.access.deps import AtStation, Station
 from app.errors import Conflict, InbandError
 from app.language.i18n import _
 from app.loop.machines.queries import machine_named
-from app.loop.readings.by_hand import sheet
+from app.loop.readings.by_hand import sheet_actions as sheet
 from app.views.station.who import REFUSED, asked, who
 from app.views.station.wording import first_sentence
 from app.web.deps import FormDep, SessionDep, Word

@@ -9,9 +9,9 @@ from playwright.sync_api import Page, expect
 from app.core.parameters import FIELDS
 from app.core.spc.rules import RuleName
 from app.loop.summaries.wording import rule_name
-from app.views.help import documents as help_documents
+from app.views.help import queries as help_documents
 from app.views.help.contents import groups
-from app.views.help.documents import document, documents, files, sections
+from app.views.help.queries import document, documents, files, sections
 from app.web.help_ways import help_of
 from app.web.terms import PAGE, term_of, terms
 from tests.conftest import Server
