@@ -119,7 +119,8 @@ def violations(page: Page, states: tuple[State, ...] = STATES) -> dict[str, str]
 FINGER = 44  # px
 
 # Everything that reacts, smaller than a finger: by itself, by its label, or by the row that its ::after covers. Links in sentences may be
-# as high as their line, and what is seen only with the keyboard may have any size.
+# as high as their line, and what is seen only with the keyboard may have any size. The sentence of a term is no act: 24 px will do (2.5.8),
+# larger ones would lie over the field beside them.
 SMALL = """(least) => {
   const REACTS = "a[href], button, input:not([type=hidden]), select, textarea, summary, [role=button]";
   const inSentence = (at) => {
@@ -141,7 +142,8 @@ SMALL = """(least) => {
   for (const at of document.querySelectorAll(REACTS)) {
     if (!at.checkVisibility({ visibilityProperty: true, opacityProperty: false }) || at.disabled || at.closest(".skip-link") || inSentence(at)) continue;
     const { width, height } = boxOf(at);
-    if (Math.round(width) < least || Math.round(height) < least)
+    const wanted = at.matches("[data-term]") ? 24 : least;
+    if (Math.round(width) < wanted || Math.round(height) < wanted)
       small.push(`${Math.round(width)} × ${Math.round(height)} ${at.outerHTML.replace(/\\s+/g, " ").slice(0, 140)}`);
   }
   return small;
