@@ -21,7 +21,7 @@ _BEHIND: tuple[tuple[str, str], ...] = (
     (r"/import(/.*)?", "how-to/import-readings"),
     (r"/characteristics/[^/]+/control(/.*)?|/count-charts", "how-to/control-charts"),
     (r"/characteristics/[^/]+/(rules|signals)|/signals/.*", "how-to/run-rules"),
-    (r"/characteristics/[^/]+/capability|/overview", "how-to/capability"),
+    (r"/characteristics/[^/]+/(capability|six-pack)|/overview", "how-to/capability"),
     (r"/characteristics/[^/]+/trial(/.*)?", "how-to/shadow-trial"),
     (r"/ledger", "how-to/ledger"),
     (r"/characteristics/[^/]+/what-if|/proposals(/.*)?", "how-to/what-if"),
