@@ -264,16 +264,16 @@ def touch_problem(error: TouchError) -> str:
     few = (error.got or 0) < error.expected
     match error.code:
         case "points" if few:
-            text = _("%(got)s points came, %(expected)s are expected: point %(point)s is missing.")
+            text = _("Points received: %(got)s, expected: %(expected)s. Point %(point)s is missing.")
         case "points":
-            text = _("%(got)s points came, %(expected)s are expected: point %(point)s is one too many.")
+            text = _("Points received: %(got)s, expected: %(expected)s. Point %(point)s is one too many.")
         case "repeats" if few:
             text = _(
-                "Point %(point)s has %(got)s touches, %(expected)s are expected (R27): repeat %(repeat)s is missing."
+                "Point %(point)s: touches received %(got)s, expected %(expected)s (R27). Repeat %(repeat)s is missing."
             )
         case "repeats":
             text = _(
-                "Point %(point)s has %(got)s touches, %(expected)s are expected (R27): repeat %(repeat)s is one too many."
+                "Point %(point)s: touches received %(got)s, expected %(expected)s (R27). Repeat %(repeat)s is one too many."
             )
         case "missing":
             text = _("Point %(point)s, repeat %(repeat)s: the touch is missing, the probe did not trigger.")

@@ -268,10 +268,10 @@ class TestTouches:
     @pytest.mark.parametrize(
         ("touches", "says"),
         [
-            ([[40.0, 40.0]], "1 points came, 2 are expected"),
-            ([[40.0, 40.0], [40.0]], "Point 2 has 1 touches, 2 are expected (R27)"),
+            ([[40.0, 40.0]], "Points received: 1, expected: 2"),
+            ([[40.0, 40.0], [40.0]], "Point 2: touches received 1, expected 2 (R27)"),
             ([[40.0, 40.0], [40.0, 41.5]], "Point 2, repeat 2: the touch at 41.5 mm lies more than 1"),
-            ([], "0 points came"),
+            ([], "Points received: 0"),
             ([[], []], "Point 1 has 0 touches"),
         ],
     )
