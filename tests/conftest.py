@@ -55,13 +55,16 @@ def pytest_xdist_auto_num_workers(config: pytest.Config) -> int:
 
 def pytest_configure(config: pytest.Config) -> None:
     chance.load(long=config.getoption("--long"))
+    gc.disable()  # until all tests are collected
     if config.getoption("--one-connection"):
         os.environ |= {"INBAND_POOL_SIZE": "1", "INBAND_POOL_OVERFLOW": "0"}
 
 
 def pytest_collection_finish() -> None:
-    """Thousands of tests were collected to stay; no round of garbage collection need look at them again."""
+    """Thousands of tests were collected to stay; no round of garbage collection need look at them again, nor often at others."""
     gc.freeze()
+    gc.set_threshold(20_000, 20, 20)  # by default, a tenth of the processor of a whole run went into it
+    gc.enable()
 
 
 def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter, config: pytest.Config) -> None:

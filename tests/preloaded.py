@@ -9,6 +9,7 @@ from app.loop.readings.writer.columnar import compile_now
 from app.web.templates import environment
 from tests import one_connection, quick_passwords  # noqa: F401 - they replace what they are about
 
+gc.disable()
 for module in pkgutil.walk_packages(app.__path__, "app."):
     if not module.name.endswith("__main__"):
         importlib.import_module(module.name)
@@ -16,3 +17,5 @@ compile_now()
 for name in environment().list_templates():
     environment().get_template(name)
 gc.freeze()
+gc.set_threshold(20_000, 20, 20)  # as in tests/conftest.py
+gc.enable()
