@@ -51,6 +51,8 @@ WITH_A_LIFE = frozenset(
         "paired_reading",
         "parameter_proposal",
         "person",
+        "quarantine",
+        "quarantined_part",
         "result_reading",
         "signal",
         "stream",

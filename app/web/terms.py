@@ -14,7 +14,7 @@ DOCS = HOUSE / "docs"
 PAGE = "/help/reference/glossary"
 _ROW = re.compile(r"^\| (?P<names>[^|]+) \| (?P<sentence>[^|]+) \| *(?P<source>[^|]*?) *\|$", re.MULTILINE)
 _NUMBERS = re.compile(r"R\d+(?:, R\d+)*")
-_MARKS = re.compile(r"\[([^\]]*)\]\([^)]*\)|[*`_]*([*`])[*`_]*")
+_MARKS = re.compile(r"\[([^\[\]]*)\]\([^()]*\)|[*`][*`_]*")
 
 
 class Term(NamedTuple):

@@ -64,6 +64,19 @@ UPGRADE = (
     """,
     "CREATE INDEX quarantined_part_open_idx ON quarantined_part (machine_id, quarantine_id) WHERE status = 'open'",
     "CREATE INDEX quarantined_part_characteristic_idx ON quarantined_part (machine_id, characteristic_id)",
+    """
+    CREATE TRIGGER facts_stay BEFORE DELETE OR TRUNCATE OR UPDATE ON quarantine
+        FOR EACH STATEMENT EXECUTE FUNCTION refuse_loss()
+    """,
+    """
+    CREATE TRIGGER facts_stay BEFORE DELETE OR TRUNCATE OR UPDATE
+        OF machine_id, quarantine_id, number, characteristic_id ON quarantined_part
+        FOR EACH STATEMENT EXECUTE FUNCTION refuse_loss()
+    """,
+    """
+    CREATE TRIGGER closed_stays BEFORE UPDATE ON quarantined_part FOR EACH ROW WHEN (OLD.status <> 'open')
+        EXECUTE FUNCTION refuse_loss()
+    """,
 )
 
 

@@ -6,15 +6,14 @@ import termios
 from pathlib import Path
 
 import pytest
-import typer
 
 from app.bridge.checking import check
 from app.bridge.configuration import configuration_from
 from app.bridge.kinds.dprnt import PrintedLink
 from app.bridge.store import Store
-from app.cli.bridge import preview
 from app.core.printed_line import Printed, line_of
 from app.core.ring import Slot, Unit
+from tests.forked import inband
 from tests.loops import run
 from tests.shop import Shop
 
@@ -125,7 +124,7 @@ def test_a_store_that_this_user_may_not_write_is_told(tmp_path: Path, monkeypatc
     ("40.001", SERVER["url"], "The sizes are not compared with their targets"),
 ])  # fmt: skip
 def test_a_preview_compares_sizes_with_their_targets(
-    shop: Shop, tmp_path: Path, capsys: pytest.CaptureFixture[str], size: str, url: str | None, words: str
+    shop: Shop, tmp_path: Path, size: str, url: str | None, words: str
 ) -> None:
     key = shop.another("seat", target=40.0, confidence_limit=1.0)
     (tmp_path / "a.csv").write_text(f"measured;part\n{size};P1\n")
@@ -135,12 +134,8 @@ def test_a_preview_compares_sizes_with_their_targets(
         f'secret = "{shop.machine_key}"\ncorrections = "none"\nfolder = {{ path = "{tmp_path}", format = "csv" }}\n'
         f'characteristics = {{ "*" = "{key}" }}\n'
     )
-    refused = False
-    try:
-        preview(shop.machine, tmp_path / "a.csv", config)
-    except typer.Exit:
-        refused = True
-    said = "".join(capsys.readouterr())
-    assert refused == (size == "-0.002")
+    done = inband("bridge", "preview", shop.machine, tmp_path / "a.csv", "--config", config)
+    said = done.stdout + done.stderr
+    assert done.returncode == (size == "-0.002")
     assert words.replace("x:", f"{key}:") in " ".join(said.split())
     assert ("not compared" in said) == (url is not None)

@@ -33,12 +33,14 @@ def write_measuring(parameters: Parameters, about: Mapping[str, str]) -> str:
 
 def drawn(parameters: Parameters) -> Parameters:
     """A natural limit said by nominal size and deviations: of R32 and R35 alone L93 would judge both sides, by R35/2."""
-    natural, width = parameters.natural_limit, parameters.tolerance_width
+    natural, width = parameters.natural_limit, round(parameters.tolerance_width, DECIMALS)
     if natural is NaturalLimit.NONE or parameters.nominal is not None:
         return parameters
     upper, lower = (width, 0.0) if natural is NaturalLimit.LOWER else (0.0, -width)
     target = round(parameters.target, DECIMALS)
-    return replace(parameters, target=target, nominal=target, upper_deviation=upper, lower_deviation=lower)
+    return replace(
+        parameters, target=target, tolerance_width=width, nominal=target, upper_deviation=upper, lower_deviation=lower
+    )
 
 
 def _r_values(parameters: Parameters) -> dict[str, float]:

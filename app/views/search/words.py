@@ -6,7 +6,7 @@ blanks, hyphens, dots and Ø count neither in what is typed nor in the names.
 
 from collections.abc import Sequence
 
-from sqlalchemy import ColumnElement, and_, case, func, literal
+from sqlalchemy import ColumnElement, and_, case, func, literal, true
 
 SEPARATORS = " -_./,;:()[]'\"Øø⌀"
 BETWEEN = "|"
@@ -56,7 +56,7 @@ def matching(words: Sequence[str], *names: ColumnElement[str]) -> tuple[ColumnEl
     ranked = case(
         (func.strpos(tight, whole + BETWEEN) > 0, 0),
         (func.strpos(tight, whole) > 0, 1),
-        (and_(*(func.strpos(spaced, f" {word}") > 0 for word in words)), 2),
+        (and_(true(), *(func.strpos(spaced, f" {word}") > 0 for word in words)), 2),
         else_=literal(3),
     )
-    return and_(*(func.strpos(tight, word) > 0 for word in words)), ranked
+    return and_(true(), *(func.strpos(tight, word) > 0 for word in words)), ranked

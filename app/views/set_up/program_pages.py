@@ -128,6 +128,7 @@ def _page(
         longest=MOST_CHARACTERS,
         diagram=parameter_form.diagram(parameter_form.typed_partly(parameters)) if judging else None,
         sentences=[],
+        one_sided=[],
         short=parameter_form.short_limit,
     )
 

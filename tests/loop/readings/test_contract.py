@@ -272,7 +272,7 @@ class TestTouches:
             ([[40.0, 40.0], [40.0]], "Point 2: touches received 1, expected 2 (R27)"),
             ([[40.0, 40.0], [40.0, 41.5]], "Point 2, repeat 2: the touch at 41.5 mm lies more than 1"),
             ([], "Points received: 0"),
-            ([[], []], "Point 1 has 0 touches"),
+            ([[], []], "Point 1: touches received 0"),
         ],
     )
     def test_touches_that_are_missing_or_impossible_are_stored_as_a_fault(

@@ -171,7 +171,7 @@ def test_touches_that_cannot_be_of_this_characteristic_are_refused_by_point_and_
         ([[40.0, 40.0], [40.0]], 40.0, "Point 2: touches received 1, expected 2 (R27). Repeat 2 is missing."),
         ([[40.0, 40.0]], 40.0, "Points received: 1, expected: 2. Point 2 is missing."),
         ([], 39.0, "Points received: 0, expected: 2. Point 1 is missing."),
-        ([None, None], 39.0, "Point 1 has 0 touches"),
+        ([None, None], 39.0, "Point 1: touches received 0"),
         ([[40.0, 40.0], [40.0, 41.0001]], 40.250025, "Point 2, repeat 2: the touch at 41.0001 mm lies more than 1"),
     ],
 )

@@ -72,7 +72,7 @@ class TestWithoutScripts:
     def test_a_reason_is_needed(self, shop: Shop, operator: Person) -> None:
         number = shop.read(20.0)["correction"]["number"]
         text = operator.send(f"/machines/{shop.machine}/corrections/{number}", 422, do="rejected")
-        assert "Is missing" in text
+        assert "Pick a reason, or write one." in text
         assert shop.correction(number)["status"] == "pending"
 
     def test_something_else_is_refused(self, shop: Shop, operator: Person) -> None:

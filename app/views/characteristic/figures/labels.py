@@ -39,7 +39,7 @@ def _share(limits: HasLimits) -> str:
 def band_text(band: Band, sign: int) -> str:
     """Action of the loop in a band, above (+1) or below (-1) the target, with the alarm; the word of the manual's diagram in brackets."""
     return {
-        "zero": f"<b>{_('Good')}</b>, {_('averaging is stored (zero compensation)')}",
+        "zero": "<b>" + _("Good") + "</b>, " + _("averaging is stored (zero compensation)"),
         "average": _("averaging and correction"),
         "full": _("corrected in full"),
         "out_of_tolerance": _("corrected in full → Oversize") if sign > 0 else _("corrected in full → Undersize"),
