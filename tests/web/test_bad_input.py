@@ -127,6 +127,16 @@ BODIES: dict[str, dict[str, Any]] = {
         "parameters": PARAMETERS | {"zero_range": 0.002},
         "reason": "Noisy machine",
     },
+    "POST /api/v1/characteristics/{characteristic}/trial/start": {
+        "weighting_factor": 3.0,
+        "zero_range": 0.0015,
+        "parameters_version": 1,
+        "reason": "Shadow trial looked at",
+    },
+    "POST /api/v1/quarantines": {"alarm": 1, "guard": 0.001, "by_hand_only": False, "reason": "Edge broken"},
+    "POST /api/v1/quarantines/{quarantine}/parts/{number}/measure": {"measured": 40.001, "reason": "Micrometer"},
+    "POST /api/v1/quarantines/{quarantine}/parts/{number}/release": WHY,
+    "POST /api/v1/quarantines/{quarantine}/parts/{number}/scrap": WHY,
     "POST /api/v1/readings": FULL_READING,
     "POST /api/v1/readings/batch": FULL_READING | {"key": "bad-input-2"},  # sent as a list of one
     "POST /api/v1/readings/{characteristic}/{sequence}/exclude": WHY,
@@ -480,6 +490,8 @@ class Place:
         self.dsn = server.database.dsn
         self.approved = f"{shop.characteristic}-a"
         shop.add(self.approved, mode="approval", tool_memory=4, average_memory=6)
+        self.on_trial = f"{shop.characteristic}-t"
+        shop.add(self.on_trial, mode="measure_only", tool_memory=8, average_memory=9)
         shop.read(6.0)
         awaiting = shop.read(6.0, self.approved)["correction"]["number"]
         held = shop.read(350.0)
@@ -534,6 +546,8 @@ class Place:
             "person": next(person[name] for name in ("id", "name", "key") if name in person),
             "key": shop.call("POST", f"/machines/{shop.machine}/keys", 201, name="second")["id"],
         }
+        set_aside = shop.call("POST", "/quarantines", 201, alarm=self.values["alarm"], reason="Edge broken")
+        self.values["quarantine"] = set_aside["id"]
         zero = BODIES["POST /api/v1/work-zeros"] | {"machine": shop.machine, "key": None}
         side = BODIES["POST /api/v1/alignments"] | {"machine": shop.machine, "key": None}
         made = {
@@ -577,6 +591,8 @@ class Place:
         of_form = ("/api/v1/forms/{number}", "/api/v1/forms/{number}/figure", "/api/v1/forms/{number}/recompute")
         self.numbers |= dict.fromkeys(of_form, form["id"])
         self.numbers |= {f"/api/v1/reports/{{number}}{what}": reports for what in of_reports}
+        of_part = "/api/v1/quarantines/{quarantine}/parts/{number}/"
+        self.numbers |= {of_part + what: 1 for what in ("measure", "release", "scrap")}
 
     @staticmethod
     def notified(shop: Shop) -> Any:
@@ -602,6 +618,8 @@ class Place:
         values["run"] = self.runs.get(verb, values["run"])
         if "/touch-tests/" in operation.path:
             values |= {"machine": self.tested.machine, "number": self.test}
+        if "/trial" in operation.path:
+            values["characteristic"] = self.on_trial
         if "/baselines" in operation.path:
             values["characteristic"] = self.line.key
         if operation.path.endswith("/retire"):
@@ -617,6 +635,8 @@ class Place:
             return value.format(**self.values) if isinstance(value, str) else value
 
         body = {name: filled(value) for name, value in BODIES[operation.name].items()}
+        if operation.path == "/api/v1/quarantines":
+            body["alarm"] = self.values["alarm"]
         return body | ({"reference": self.zero} if "/fixtures/" in operation.path else {})
 
     def send(self, operation: Operation, content: bytes | str, **headers: str) -> httpx.Response:

@@ -12,8 +12,7 @@
 //
 // What the reader is doing is kept: focus, selection, opened <details> (those with an id or data-key), scrolling.
 // While he types in it, presses something in it or has a dialog or a popover of it open, it waits. If fetching fails it says so and how
-// old the content is.
-// Fires "livepart" (bubbles) after each swap.
+// old the content is. Fires "livepart" (bubbles) after each swap.
 
 import { coalesced } from "./coalesce.js";
 import { afterEvent, subscribe } from "./live.js";
@@ -64,16 +63,16 @@ class LivePart extends HTMLElement {
   }
 
   items(root) {
-    const name = (item) => item.id || item.getAttribute("aria-labelledby");
-    return this.hasAttribute("still") ? [...root.querySelectorAll(this.getAttribute("still"))].map(name) : [];
+    const items = this.hasAttribute("still") ? root.querySelectorAll(this.getAttribute("still")) : [];
+    return [...items].map((item) => item.id || item.getAttribute("aria-labelledby"));
   }
 
   /** Says how many items wait to be shown. */
   announce(fresh) {
     const here = new Set(this.items(this));
     const count = this.items(fresh).filter((item) => !here.has(item)).length;
-    if (!count) return void this.querySelector(".still-news")?.remove();
     let news = this.querySelector(".still-news");
+    if (!count) return void news?.remove();
     if (!news) {
       news = Object.assign(document.createElement("div"), { className: "still-news" });
       news.setAttribute("role", "status");
@@ -92,8 +91,7 @@ class LivePart extends HTMLElement {
   get busy() {
     const active = document.activeElement;
     const typing = this.contains(active) && active.matches("input:not([type=hidden]), textarea, select");
-    const pressing = performance.now() - this.pressed < PRESS;
-    return typing || pressing || this.querySelector("dialog[open], :popover-open") !== null;
+    return typing || performance.now() - this.pressed < PRESS || this.querySelector("dialog[open], :popover-open") !== null;
   }
 
   async load() {
@@ -111,14 +109,12 @@ class LivePart extends HTMLElement {
         this.announce(fresh);
         return void setTimeout(() => this.isConnected && this.refresh(), 1_000);
       }
-      const before = this.items(this).join();
-      const after = this.items(fresh).join();
+      const [before, after] = [this, fresh].map((root) => this.items(root).join());
       this.swap(fresh);
       if (before !== after) this.settle();
       this.wanted = false;
       this.fetched = Date.now();
-      this.removeAttribute("stale");
-      this.removeAttribute("title");
+      for (const name of ["stale", "title"]) this.removeAttribute(name);
     } catch {
       this.setAttribute("stale", "");
       this.setAttribute("title", age((Date.now() - this.fetched) / 1000));

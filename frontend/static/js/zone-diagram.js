@@ -8,8 +8,8 @@
 //   – marks a limit that breaks R33 < R34 ≤ R35/2 ≤ R37 ≤ R36, and says why at the field, in the server's own sentences.
 // The server checks the same again when the form is sent; without this script nothing is lost but the immediacy.
 
+import { naturalSide, ofClass, ofName, ofTolerance } from "./proposed-limits.js";
 import { deviation, millimetres, MINUS, nanometres, plain, size, typed, usable } from "./sizes.js";
-import { here } from "./root.js";
 
 const NAMES = ["nominal", "upper_deviation", "lower_deviation", "target", "tolerance_width",
   "zero_range", "averaging_limit", "wear_limit", "confidence_limit"];
@@ -24,40 +24,22 @@ customElements.define("zone-diagram", class extends HTMLElement {
       this.draw();
     };
     this.form.addEventListener("input", this.typing);
-    this.leaving = ({ target }) => {
-      if (target.name === "nominal") this.fit(target.value);
-      if (target.name === "name") this.natural_by(target.value);
+    this.leaving = async ({ target: { name, value } }) => {
+      if (name === "name") this.fill(await ofName(this.form, value));
+      if (name !== "nominal") return;
+      const numbers = await ofClass(this.form, value);
+      if (numbers) this.unknown = "nominal" in numbers ? null : value; // refused in words when the form is sent
+      this.fill(numbers);
     };
     this.form.addEventListener("change", this.leaving);
     this.draw();
   }
 
-  /** The server knows the tables of ISO 286. A class that it does not know is refused in words when the form is sent. */
-  async fit(size) {
-    if (!/[a-z]/i.test(size)) return;
-    const answer = await fetch(`${here("/setup/fit")}?${new URLSearchParams({ size: size.slice(0, 40) })}`).catch(() => null);
-    const numbers = answer?.ok ? await answer.json() : {};
-    if (this.form.elements.nominal.value !== size) return;
-    this.unknown = "nominal" in numbers ? null : size;
-    for (const [name, value] of Object.entries(numbers)) {
+  fill(values) {
+    if (!values) return;
+    for (const [name, value] of Object.entries(values)) {
       this.form.elements[name].value = value;
       this.forget(this.form.elements[name]);
-    }
-    this.draw();
-  }
-
-  /** A name is a proposal: what is typed, chosen or corrected by a tool already is left alone. */
-  async natural_by(name) {
-    const fields = this.form.elements;
-    const isUntouched = () => !fields.nominal.value && !fields.lower_deviation.value && !fields.natural_limit.value
-      && !fields.target.value && !typed(fields.tool_memory.value) && fields.name.value === name;
-    if (!name || !isUntouched()) return;
-    const answer = await fetch(`${here("/setup/natural")}?${new URLSearchParams({ name: name.slice(0, 200) })}`).catch(() => null);
-    const proposed = answer?.ok ? await answer.json() : {};
-    if (!isUntouched()) return;
-    for (const [field, value] of Object.entries(proposed)) {
-      fields[field].value = value;
-      this.forget(fields[field]);
     }
     this.draw();
   }
@@ -82,7 +64,7 @@ customElements.define("zone-diagram", class extends HTMLElement {
       target = values.nominal + (values.upper_deviation + values.lower_deviation) / 2;
       width = values.upper_deviation - values.lower_deviation;
     }
-    const natural = this.natural(values); // -1, 0 or 1: the side that does not exist; the target is its limit
+    const natural = naturalSide(this.form, values); // -1, 0 or 1: the side that does not exist; the target is its limit
     if (natural && drawing.every(usable)) target += (natural * width) / 2;
     const half = natural ? width : width / 2;
     const limits = {
@@ -90,28 +72,14 @@ customElements.define("zone-diagram", class extends HTMLElement {
       tolerance: usable(width) ? half : null,
       averaging_limit: values.averaging_limit ?? (usable(width) ? (half * 2) / 3 : null),
     };
-    if ("suggests" in this.form.dataset && usable(half) && half > 0) this.suggest(values, limits, half);
-    this.form.elements.averaging_limit.placeholder = usable(width) && width > 0 ? plain((half * 2) / 3) : "";
-    this.write(target, width, limits, natural);
-    this.explain(values, limits, natural);
-  }
-
-  /** What an empty field of a new characteristic takes, as `app/core/suggested.py` has it; the signal path may ask for more. */
-  suggest(values, limits, half) {
-    const wear = Math.max(0.3, half);
-    const suggested = { zero_range: Math.min(Math.max(0.001, half / 10), half / 3), wear_limit: wear, confidence_limit: Math.max(1, wear) };
+    const suggested = "suggests" in this.form.dataset && usable(half) && half > 0 ? ofTolerance(half) : {};
     for (const [name, value] of Object.entries(suggested)) {
       this.form.elements[name].placeholder = plain(value);
       limits[name] = values[name] ?? value;
     }
-  }
-
-  /** The side of the natural limit; where none is chosen as the server has it: 0 at best, no minus, nothing corrected. */
-  natural(values) {
-    const { natural_limit: chosen, tool_memory: tool, mode } = this.form.elements;
-    if (chosen?.value) return { lower: -1, upper: 1 }[chosen.value] ?? 0;
-    const measures = !typed(tool?.value ?? "") || mode?.value === "measure_only";
-    return chosen && measures && values.nominal === 0 && values.lower_deviation === 0 && values.upper_deviation > 0 ? -1 : 0;
+    this.form.elements.averaging_limit.placeholder = usable(width) && width > 0 ? plain((half * 2) / 3) : "";
+    this.write(target, width, limits, natural);
+    this.explain(values, limits, natural);
   }
 
   write(target, width, limits, natural) {

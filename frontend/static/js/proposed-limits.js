@@ -1,0 +1,41 @@
+// What is proposed for a size or a name as it is typed, and for limits that are left empty (zone-diagram.js).
+
+import { here } from "./root.js";
+import { typed } from "./sizes.js";
+
+async function asked(path, words) {
+  const answer = await fetch(`${here(path)}?${new URLSearchParams(words)}`).catch(() => null);
+  return answer?.ok ? answer.json() : {};
+}
+
+/** Nominal size and deviations of a tolerance class such as 40 h6, by the server's tables of ISO 286; {} if it has no such class.
+ *  null: there is no class in it, or something else is typed by now. */
+export async function ofClass(form, size) {
+  if (!/[a-z]/i.test(size)) return null;
+  const numbers = await asked("/setup/fit", { size: size.slice(0, 40) });
+  return form.elements.nominal.value === size ? numbers : null;
+}
+
+/** 0 and the natural limit for a name such as Run-out. null: something is typed, chosen or corrected by a tool already. */
+export async function ofName(form, name) {
+  const fields = form.elements;
+  const isUntouched = () => !fields.nominal.value && !fields.lower_deviation.value && !fields.natural_limit.value
+    && !fields.target.value && !typed(fields.tool_memory.value) && fields.name.value === name;
+  if (!name || !isUntouched()) return null;
+  const values = await asked("/setup/natural", { name: name.slice(0, 200) });
+  return isUntouched() ? values : null;
+}
+
+/** Limits of a new characteristic, mm, as `app/core/suggested.py` has them; the signal path may ask for more. */
+export function ofTolerance(half) {
+  const wear = Math.max(0.3, half);
+  return { zero_range: Math.min(Math.max(0.001, half / 10), half / 3), wear_limit: wear, confidence_limit: Math.max(1, wear) };
+}
+
+/** -1, 0 or 1: the side of the natural limit; where none is chosen as the server has it: 0 at best, no minus, nothing corrected. */
+export function naturalSide(form, values) {
+  const { natural_limit: chosen, tool_memory: tool, mode } = form.elements;
+  if (chosen?.value) return { lower: -1, upper: 1 }[chosen.value] ?? 0;
+  const measures = !typed(tool?.value ?? "") || mode?.value === "measure_only";
+  return chosen && measures && values.nominal === 0 && values.lower_deviation === 0 && values.upper_deviation > 0 ? -1 : 0;
+}
