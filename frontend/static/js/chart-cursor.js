@@ -38,6 +38,14 @@ export class ChartCursor {
     document.removeEventListener("chartcursor", this.onShared);
   }
 
+  /** Once Plotly has drawn: follow its view and what the mouse is over. */
+  listen() {
+    const { plot } = this.chart;
+    for (const happening of ["plotly_afterplot", "plotly_relayouting"]) plot.on(happening, () => this.place());
+    plot.on("plotly_hover", ({ points }) => points[0]?.x != null && this.tell(this.chart.axis.r2l(points[0].x)));
+    plot.on("plotly_unhover", () => this.tell(this.at?.x ?? null));
+  }
+
   get axisName() {
     return `${this.chart.axis?.type} ${this.chart.axis?.title?.text}`;
   }

@@ -15,6 +15,7 @@
 
 import { ChartCursor } from "./chart-cursor.js";
 import { gestures } from "./chart-gestures.js";
+import { scalable } from "./chart-paper.js";
 import { ChartStrip } from "./chart-strip.js";
 import { ChartTrouble } from "./chart-trouble.js";
 import { ChartView } from "./chart-view.js";
@@ -25,7 +26,6 @@ import { loadPlotly } from "./plotly-library.js";
 
 const CONFIG = { displayModeBar: false, displaylogo: false, responsive: true, scrollZoom: false, showTips: false };
 const LONG = 50; // points; below fewer there is no strip until a part of them is shown
-const PAPER = 860; // px
 const SETTLED = 250; // ms after the last change of the view finer data is fetched
 
 class PlotlyChart extends HTMLElement {
@@ -78,9 +78,7 @@ class PlotlyChart extends HTMLElement {
     gestures(this);
   }
 
-  get axis() {
-    return this.drawn ? this.plot._fullLayout.xaxis : null;
-  }
+  get axis() { return this.drawn ? this.plot._fullLayout.xaxis : null; }
 
   async load() {
     try {
@@ -121,11 +119,8 @@ class PlotlyChart extends HTMLElement {
       this.view.show([event["xaxis.range[0]"], event["xaxis.range[1]"]].map((end) => this.axis.r2l(end)));
     });
     this.plot.on("plotly_doubleclick", () => this.movable && this.view.shown && this.view.show(null));
-    this.plot.on("plotly_afterplot", () => scalable(this.plot));
     scalable(this.plot);
-    for (const happening of ["plotly_afterplot", "plotly_relayouting"]) this.plot.on(happening, () => this.cursor.place());
-    this.plot.on("plotly_hover", ({ points }) => points[0]?.x != null && this.cursor.tell(this.axis.r2l(points[0].x)));
-    this.plot.on("plotly_unhover", () => this.cursor.tell(this.cursor.at?.x ?? null));
+    this.cursor.listen();
   }
 
   // Another part is to be shown.
@@ -149,19 +144,5 @@ class PlotlyChart extends HTMLElement {
     if (this.movable || this.cursor.points.length) this.tabIndex = 0;
   }
 }
-
-// A drawing grows and shrinks with its frame, as the page's print sheet says.
-function scalable(plot) {
-  for (const svg of plot.querySelectorAll(".main-svg")) svg.setAttribute("viewBox", `0 0 ${svg.getAttribute("width")} ${svg.getAttribute("height")}`);
-}
-
-// Paper is narrower than a screen: a chart is drawn for it, so that its letters can be read.
-const charts = () => [...document.querySelectorAll("plotly-chart")].filter((chart) => chart.drawn);
-window.addEventListener("beforeprint", () => {
-  for (const { plot } of charts()) if (plot.clientWidth > PAPER) window.Plotly.relayout(plot, { width: PAPER, height: plot.clientHeight });
-});
-window.addEventListener("afterprint", () => {
-  for (const { plot } of charts()) window.Plotly.relayout(plot, { width: null, height: null, autosize: true });
-});
 
 customElements.define("plotly-chart", PlotlyChart);
