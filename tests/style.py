@@ -1,5 +1,5 @@
 """Style that no linter knows: lengths of `app/` that may only shrink, summaries that are no questions, width of templates,
-words.
+words, sentences that can be translated.
 
 For `make lint`.
 """
@@ -62,6 +62,9 @@ def main() -> int:
                         f"{place}: a summary is no question ({words[0]} …): name the thing, or say what it does.\n"
                     )
                     status = 1
+    for place in hidden_sentences(files):
+        sys.stderr.write(f"{place}: pybabel does not see a sentence inside an f-string: put it beside.\n")
+        status = 1
     for place, word in sorted(words_not_said(files)):
         sys.stderr.write(f"{place}: “{word}” is not said here; see NOT_SAID in tests/style.py.\n")
         status = 1
@@ -74,6 +77,18 @@ def main() -> int:
                 )
                 status = 1
     return status
+
+
+def hidden_sentences(files: dict[Path, str]) -> Iterator[str]:
+    """Places of `_()` inside f-strings, where no catalogue of translations gets them."""
+    for path, text in files.items():
+        for written in ast.walk(ast.parse(text)):
+            if isinstance(written, ast.JoinedStr) and any(map(_is_sentence, ast.walk(written))):
+                yield f"{path.relative_to(APP.parent)}:{written.lineno}"
+
+
+def _is_sentence(node: ast.AST) -> bool:
+    return isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and node.func.id in {"_", "ngettext"}
 
 
 def words_not_said(files: dict[Path, str]) -> Iterator[tuple[str, str]]:

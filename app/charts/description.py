@@ -286,9 +286,14 @@ def words_of(rule: Rule) -> Note:
     return Note(words, Share(1), rule.y, "left", shift=(8, raised), colour=colour)
 
 
+def bold(words: str) -> str:
+    """Words in bold letters."""
+    return f"<b>{words}</b>"
+
+
 def empty(words: str) -> Note:
     """Words in the middle of a panel with nothing in it."""
-    return Note(f"<b>{words}</b>", Share(0.5), Share(0.5, inside=True), size=15, ground=True)
+    return Note(bold(words), Share(0.5), Share(0.5, inside=True), size=15, ground=True)
 
 
 def nothing(words: str) -> Chart:

@@ -111,7 +111,7 @@ def _tell(found: "list[Content]", chosen: dict[int, str], encoding: str) -> None
             reason = each.not_new or _("nothing of its part here has its number or name; --map or --create-missing")
             say(_("{title}: left out: {reason}.").format(title=each.title, reason=reason), style="yellow")
             continue
-        say(f"{each.title} → {_('to be set up') if key == NEW else key}")
+        say(f"{each.title} → {key}" if key != NEW else each.title + " → " + _("to be set up"))
         for remark in each.remarks:
             say(f"  {remark}")
 

@@ -100,9 +100,8 @@ def _result(path: Path, code: int, limits: Limits, work: Callable[..., Any]) -> 
     if code == DISK_FULL:
         raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
     if code:
-        raise Unusable(
-            f"{_reason(code, limits)} {_('Part it into several files, or import it with `inband import` at the server.')}"
-        )
+        remedy = _("Part it into several files, or import it with `inband import` at the server.")
+        raise Unusable(f"{_reason(code, limits)} {remedy}")
     done, outcome = pickle.loads(path.read_bytes())  # noqa: S301 - see above
     if done:
         return outcome

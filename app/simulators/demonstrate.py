@@ -61,7 +61,7 @@ def demo(
         plant_key.append(people.plant_key(database))
         say(_("Sign in as one of these (kept for the next start in {file}):").format(file=people.file_of(settings)))
         for name in people.PEOPLE:
-            say(f"  {name:<9} {passwords.get(name, _('(the password you have chosen)'))}", style="bold")
+            say(f"  {name:<9} " + passwords.get(name, _("(the password you have chosen)")), style="bold")
 
     def beside(settings: "Settings") -> None:
         start(settings, plant_key[0], seed, speed, past)

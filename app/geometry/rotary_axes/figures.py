@@ -10,7 +10,23 @@ from collections.abc import Mapping, Sequence
 from math import isfinite
 from typing import Any
 
-from app.charts import Axis, Chart, Dots, Mark, Note, Panel, Pen, Role, Room, Series, Share, Spread, nothing, time_axis
+from app.charts import (
+    Axis,
+    Chart,
+    Dots,
+    Mark,
+    Note,
+    Panel,
+    Pen,
+    Role,
+    Room,
+    Series,
+    Share,
+    Spread,
+    bold,
+    nothing,
+    time_axis,
+)
 from app.geometry.rotary_axes.drift import Compared, Drift
 from app.geometry.rotary_axes.result_values import UNITS, as_reading
 from app.geometry.rotary_axes.wording import difference, name_words
@@ -97,7 +113,7 @@ def comparison(changes: Sequence[Compared], entered: Mapping[str, float]) -> Cha
         marks.append(Series([before[row], after[row]], [row, row], pen))
         words = [_moved(change)]
         if (enter := entered.get(change.name)) is not None:
-            words.append(f"<b>{_('enter {value}').format(value=told(change.name, enter))}</b>")
+            words.append(bold(_("enter {value}").format(value=told(change.name, enter))))
         marks.append(Note(" · ".join(words), Share(1), row, "right", size=14, colour="ink"))
     for name, values, symbol in ((_("then"), before, "circle-open"), (_("now"), after, "diamond")):
         # The points have the colour of what they mean, so the legend has a mark of its own.
@@ -188,8 +204,9 @@ def course(drift: Drift) -> Chart:
             spread=Spread(spread) if any(spread) else None,
             meta=drift.name,
             hover=[
-                f"{_('run {n}').format(n=point.number)}: {point.true * factor:+.4g} {unit}"
-                + (f", {_('to be confirmed')}" if point.waits else "")
+                _("run {n}").format(n=point.number)
+                + f": {point.true * factor:+.4g} {unit}"
+                + (", " + _("to be confirmed") if point.waits else "")
                 for point in drift.points
             ],
             links=[f"/kinematics/runs/{point.number}" for point in drift.points],

@@ -338,7 +338,9 @@ def cannot_enter(row: RunRow) -> tuple[str, str]:
         return _("Run {number} was refused and is not used.").format(number=number), _("Measure again.")
     if row.status == "to_confirm":
         warned = " ".join(warning(item) for item in row.warnings) or sentence(row.run)
-        return f"{_('Run {number}').format(number=number)}: {warned}", _("Confirm it first, with a reason.")
+        return _("Run {number}: {warnings}").format(number=number, warnings=warned), _(
+            "Confirm it first, with a reason."
+        )
     if row.overtaken:
         return (
             _("The kinematics has been changed since run {number} was measured.").format(number=number),

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from datetime import datetime
 from math import hypot
 
-from app.charts import Axis, Chart, Dots, Panel, Pen, Role, Room, Rule, Series, time_axis
+from app.charts import Axis, Chart, Dots, Panel, Pen, Role, Room, Rule, Series, bold, time_axis
 from app.charts import Mark as Drawn
 from app.language.i18n import _
 from app.language.numbers import um
@@ -67,7 +67,8 @@ def shift_figure(marks: Sequence[Mark], warning: float | None, alarm: float | No
                 meta=axis,
                 name=axis.upper(),
                 hover=[
-                    f"<b>{_('Work zero {n}').format(n=mark.number)}</b>, {mark.offset}<br>{axis.upper()} {um(mark.shifts[axis])}"
+                    bold(_("Work zero {n}").format(n=mark.number))
+                    + f", {mark.offset}<br>{axis.upper()} {um(mark.shifts[axis])}"
                     for mark in mine
                 ],
                 links=[f"/work-zeros/{mark.number}" for mark in mine],

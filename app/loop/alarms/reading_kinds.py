@@ -98,10 +98,11 @@ TOOL_WORN = register(
 
 
 def _probe_fault(alarm: Alarm) -> str:
+    paused = " " + _("Compensation is paused.")
     if alarm.data.get("first_move_triggered"):
-        return f"{first_move_sentence(alarm.data.get('feature'))} {_('Compensation is paused.')}{_cannot_be_stopped(alarm)}"
+        return first_move_sentence(alarm.data.get("feature")) + paused + _cannot_be_stopped(alarm)
     if "touch" in alarm.data:
-        return f"{touch_problem(TouchError(**alarm.data['touch']))} {_('Compensation is paused.')}{_cannot_be_stopped(alarm)}"
+        return touch_problem(TouchError(**alarm.data["touch"])) + paused + _cannot_be_stopped(alarm)
     if alarm.data.get("beyond_natural_limit"):
         text = _(
             "Deviation {deviation} lies beyond the natural limit, where no part can be: the probe, the zero or the sign is wrong. "

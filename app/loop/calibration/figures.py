@@ -6,7 +6,23 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from datetime import datetime
 
-from app.charts import Axis, Chart, Dots, Note, Panel, Pen, Role, Room, Series, Share, Spread, band, nothing, time_axis
+from app.charts import (
+    Axis,
+    Chart,
+    Dots,
+    Note,
+    Panel,
+    Pen,
+    Role,
+    Room,
+    Series,
+    Share,
+    Spread,
+    band,
+    bold,
+    nothing,
+    time_axis,
+)
 from app.charts import Mark as Drawn
 from app.language.i18n import _
 from app.language.numbers import um
@@ -130,7 +146,8 @@ def _marks(marks: Sequence[Mark], edges: tuple[float, float]) -> list[Series]:
                 meta=status,
                 name=chosen[0].status_word,
                 hover=[
-                    f"<b>{_('Calibration {n}').format(n=mark.number)}</b>: {um(mark.difference)}<br>{_broken(mark.text)}"
+                    bold(_("Calibration {n}").format(n=mark.number))
+                    + f": {um(mark.difference)}<br>{_broken(mark.text)}"
                     for mark in chosen
                 ],
                 links=[f"#calibration-{mark.number}" for mark in chosen],

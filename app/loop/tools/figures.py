@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from datetime import datetime
 
-from app.charts import Axis, Bars, Chart, Dots, Mark, Panel, Pen, Room, Rule, Series, nothing, time_axis
+from app.charts import Axis, Bars, Chart, Dots, Mark, Panel, Pen, Room, Rule, Series, bold, nothing, time_axis
 from app.language.i18n import _
 from app.language.numbers import um
 from app.language.times import local
@@ -58,7 +58,8 @@ def offset_figure(changes: Sequence[OffsetChange]) -> Chart:
                     meta=kind,
                     links=[change.link for change in chosen],
                     hover=[
-                        f"<b>{name}</b><br>{_('offset {offset}').format(offset=um(change.offset))}"
+                        f"<b>{name}</b><br>"
+                        + _("offset {offset}").format(offset=um(change.offset))
                         + (f"<br>{change.text}" if change.text else "")
                         for change in chosen
                     ],
@@ -166,4 +167,4 @@ def _parts_lines(usual: float | None, planned: int | None) -> list[Rule]:
 
 
 def _life_text(life: LifeBar, value: str, what: str) -> str:
-    return f"<b>{life.edge or _('Edge')}</b><br>{value} {what}"
+    return bold(life.edge or _("Edge")) + f"<br>{value} {what}"

@@ -78,7 +78,7 @@ def beyond(view: View, drawn: NDArray[np.int64], links: list[object], low: float
             ),
             labels=Labels(texts, beside, "ink") if sum(map(bool, texts)) <= WITH_VALUES else None,
             meta="beyond",
-            hover=[f"{_('Reading')} {number}<br>{value}" for number, value in zip(x.tolist(), said, strict=True)],
+            hover=[_("Reading") + f" {number}<br>{value}" for number, value in zip(x.tolist(), said, strict=True)],
             links=[links[at] for at in np.flatnonzero(far).tolist()],
         )
     ]

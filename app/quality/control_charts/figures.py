@@ -122,7 +122,7 @@ def _links(view: View, key: str, *, picks: bool) -> Links:
 
 def _hover(view: View) -> str:
     value = "%{y:.2f}" if view.kind in UNSIGNED else "%{y:+.2f}"
-    return f"{_('Reading')} %{{x:d}}<br>{value} µm"
+    return _("Reading") + " %{x:d}<br>" + value + " µm"
 
 
 def _limits(view: View, drawn: NDArray[np.int64]) -> list[Series]:

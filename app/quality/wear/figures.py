@@ -25,6 +25,7 @@ from app.charts import (
     Series,
     Share,
     band,
+    bold,
     nothing,
     reading_axis,
 )
@@ -182,12 +183,14 @@ def _life(life: Life, chart: WearChart, edges: tuple[float, float], *, is_now: b
         name=_("Wear curve") if is_now else "",
         hover=[
             (
-                f"<b>{_('Reading {n}').format(n=number)}</b>"
+                bold(_("Reading {n}").format(n=number))
                 if count == 1
-                else f"<b>{_('{count} readings up to {n}').format(count=count, n=number)}</b>"
+                else bold(_("{count} readings up to {n}").format(count=count, n=number))
             )
-            + f"<br>{_('wear {worn}, of which {taken} corrected').format(worn=um(worn), taken=um(removed))}"
-            + f"<br>{_('deviation {deviation}').format(deviation=um(worn - removed))}"
+            + "<br>"
+            + _("wear {worn}, of which {taken} corrected").format(worn=um(worn), taken=um(removed))
+            + "<br>"
+            + _("deviation {deviation}").format(deviation=um(worn - removed))
             for number, worn, removed, count in zip(life.sequence, life.worn, life.removed, life.counts, strict=True)
         ],
         links=[f"/characteristics/{chart.key}/readings/{number}" for number in life.sequence],
@@ -197,7 +200,7 @@ def _life(life: Life, chart: WearChart, edges: tuple[float, float], *, is_now: b
 
 def _line(fit: Fit, ahead: float, widening: float, between: tuple[float, float]) -> list[Series]:
     """The fitted line, and its forecast with the interval of a single part, as far as the chart reaches (`between`, µm)."""
-    said = f"{per_part(fit.slope)} {_('per part')}"
+    said = per_part(fit.slope) + " " + _("per part")
     line = Series(
         [fit.first, fit.last],
         [_um(fit.at(fit.first - fit.last)), _um(fit.level)],

@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
-from app.charts import Axis, Chart, Dots, Panel, Pen, Room, Rule, Series, reading_axis
+from app.charts import Axis, Chart, Dots, Panel, Pen, Room, Rule, Series, bold, reading_axis
 from app.core.natural import NaturalLimit, tolerance_about_target
 from app.language.i18n import _
 
@@ -52,7 +52,7 @@ def course_figure(chart: CourseChart, *, width: int = 1240) -> Chart:
             Dots(symbol, 5, pen.colour) if alone else None,
             meta="course",
             name=name,
-            hover=f"<b>{_('Reading')} %{{x}}</b><br>%{{y:+.1f}} µm<br>{name}",
+            hover=bold(_("Reading") + " %{x}") + f"<br>%{{y:+.1f}} µm<br>{name}",
         )
         for line, _taken, name, pen, symbol in courses
     ]
@@ -62,7 +62,7 @@ def course_figure(chart: CourseChart, *, width: int = 1240) -> Chart:
             [round(value * 1000, 3) for value in taken.values],
             replace(pen, steps="hv"),
             meta="taken",
-            hover=f"<b>{_('Reading')} %{{x}}</b><br>%{{y:+.1f}} µm {_('taken out')}<br>{name}",
+            hover=bold(_("Reading") + " %{x}") + "<br>%{y:+.1f} µm " + _("taken out") + f"<br>{name}",
         )
         for _line, taken, name, pen, _symbol in courses
     ]

@@ -226,7 +226,7 @@ def _refuse_wide(header: Collection[str]) -> None:
         )
     for number, name in enumerate(header, 1):
         if len(name) > LONGEST_NAME:
-            raise wrong("file", f"{_('column {n}').format(n=number)} {_long_name(name)}")
+            raise wrong("file", _("column {n}").format(n=number) + " " + _long_name(name))
 
 
 def _long_name(name: str) -> str:
@@ -317,7 +317,7 @@ def _drawn(layout: Layout, rows: Iterable[tuple[int, Sequence[Any]]]) -> dict[st
         if not name:
             continue
         if len(name) > LONGEST_NAME:
-            raise wrong(f"{layout.named('characteristic')}, {_('line {line}').format(line=line)}", _long_name(name))
+            raise wrong(layout.named("characteristic") + ", " + _("line {line}").format(line=line), _long_name(name))
         nominal, upper, lower, natural, unit = (
             " ".join(written(cells[at]) for at in layout.columns.get(each, ())) for each in (*DRAWN, "unit")
         )

@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from datetime import datetime
 
-from app.charts import Dots, Faded, Pen, Series, band
+from app.charts import Dots, Faded, Pen, Series, band, bold
 from app.core.decision.limits import Limits, classify
 from app.language.i18n import _
 from app.language.numbers import grouped, um
@@ -109,7 +109,7 @@ def envelope(
 
 def block_words(first: int, last: int, largest: str, smallest: str, *middle: str) -> str:
     """Words of a block when it is pointed at, from the largest value downward."""
-    head = f"<b>{_('Readings {first} to {last}').format(first=first, last=last)}</b>"
+    head = bold(_("Readings {first} to {last}").format(first=first, last=last))
     ends = _("largest {value}").format(value=largest), _("smallest {value}").format(value=smallest)
     return "<br>".join((head, ends[0], *middle, ends[1]))
 

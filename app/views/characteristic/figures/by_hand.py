@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from app.charts import Dots, Series
+from app.charts import Dots, Series, bold
 from app.language.i18n import _
 from app.language.numbers import um
 from app.views.characteristic.figures.scale import Scale
@@ -36,8 +36,8 @@ def hand_marks(points: Sequence[HandPoint], ruler: Scale) -> list[Series]:
             meta="by-hand",
             name=_("Measured by hand"),
             hover=[
-                f"<b>{_('Reading {n}, by hand').format(n=point.sequence)}</b><br>{um(point.deviation)} · "
-                f"{verdicts[point.good]}<br>{point.by}"
+                bold(_("Reading {n}, by hand").format(n=point.sequence))
+                + f"<br>{um(point.deviation)} · {verdicts[point.good]}<br>{point.by}"
                 for point in points
             ],
             links=[point.link for point in points],

@@ -9,7 +9,7 @@ from datetime import datetime, timedelta
 import numpy as np
 from numpy.typing import NDArray
 
-from app.charts import Axis, Bars, Chart, Dots, Note, Panel, Pen, Room, Rule, Series, empty, time_axis
+from app.charts import Axis, Bars, Chart, Dots, Note, Panel, Pen, Room, Rule, Series, bold, empty, time_axis
 from app.core.decision.limits import HasLimits, Limits, in_nanometres
 from app.core.natural import NaturalLimit, half_of, natural_of, tolerance_about_target
 from app.language.i18n import _
@@ -173,7 +173,7 @@ def run_figure(
         hover=[
             "<br>".join(
                 (
-                    f"<b>{_('Reading {n}').format(n=p.sequence)}</b>",
+                    bold(_("Reading {n}").format(n=p.sequence)),
                     f"{um(p.deviation)} · {zone_name(p.zone)}",
                     *size_lines(p.size, p.measured),
                 )

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from app.charts import Dots, Note, Pen, Role, Series, Share
+from app.charts import Dots, Note, Pen, Role, Series, Share, bold
 from app.language.i18n import _
 from app.language.numbers import um
 from app.loop.timeline.figures import TOOL_CHANGE, Event
@@ -86,8 +86,9 @@ def offset_lane(
             dots=Dots(symbols, 8 if len(at) <= 30 else 6, colours, edge=colours),
             meta="corrections",
             hover=[
-                f"<b>{_('Correction {n}').format(n=step.number)}</b><br>{um(step.amount)} · {status_word(step.status)}"
-                f"<br>{_('Reading {n}').format(n=step.sequence)}"
+                bold(_("Correction {n}").format(n=step.number))
+                + f"<br>{um(step.amount)} · {status_word(step.status)}<br>"
+                + _("Reading {n}").format(n=step.sequence)
                 for step, _total in at
             ],
             links=[step.link for step, _total in at],

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from app.charts import Axis, Chart, Dots, Mark, Panel, Pen, Room, Series, band, empty
+from app.charts import Axis, Chart, Dots, Mark, Panel, Pen, Room, Series, band, bold, empty
 from app.language.i18n import _
 from app.language.numbers import NO_BREAK_SPACE, signed
 from app.views.characteristic.figures.blocks import BETWEEN, EDGE, block_words
@@ -75,8 +75,9 @@ def _points(name: str, points: Sequence[ResultPoint]) -> list[Series]:
             Dots(symbols, 7 if few else 4),
             meta="results",
             hover=[
-                f"<b>{_('Reading {n}').format(n=point.sequence)}</b><br>{worded(name, point.value)}"
-                + (f"<br>{_('excluded from statistics')}" if point.excluded else "")
+                bold(_("Reading {n}").format(n=point.sequence))
+                + f"<br>{worded(name, point.value)}"
+                + ("<br>" + _("excluded from statistics") if point.excluded else "")
                 for point in points
             ],
             links=[point.link for point in points],

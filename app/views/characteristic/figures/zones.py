@@ -15,7 +15,7 @@ from datetime import datetime
 from math import fsum
 from typing import Literal
 
-from app.charts import Axis, Chart, Dots, Faded, Note, Panel, Pen, Room, Series, empty
+from app.charts import Axis, Chart, Dots, Faded, Note, Panel, Pen, Room, Series, bold, empty
 from app.charts import Mark as Drawn
 from app.core.decision.limits import HasLimits, Limits
 from app.language.i18n import _
@@ -153,7 +153,7 @@ def _size_axis(limits: HasLimits, ruler: Scale, sizes: SizeAxis | None, letters:
 
 
 def _hover(point: Point) -> str:
-    lines = [f"<b>{_('Reading {n}').format(n=point.sequence)}</b>", f"{um(point.deviation)} · {zone_name(point.zone)}"]
+    lines = [bold(_("Reading {n}").format(n=point.sequence)), f"{um(point.deviation)} · {zone_name(point.zone)}"]
     lines += size_lines(point.size, point.measured)
     if point.average is not None:
         lines.append(_("running average {average}").format(average=um(point.average, 2)))
