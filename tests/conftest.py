@@ -35,7 +35,7 @@ from app import HOUSE
 from app.db import migrate
 from app.db.embedded import EmbeddedServer
 from app.db.engine import Database
-from tests import chance, one_connection, quick_passwords  # noqa: F401 - the last two replace what they are about
+from tests import chance, keeper, one_connection, quick_passwords  # noqa: F401 - the last two replace what they are about
 from tests.db.first_program import make_first_program
 from tests.forked import Forked
 from tests.server_logs import follow, pytest_runtest_makereport, pytest_runtest_setup  # noqa: F401 - hooks of pytest
@@ -126,7 +126,7 @@ def shared_dir(tmp_path_factory: pytest.TempPathFactory) -> Path:
 @pytest.fixture(scope="session")
 def postgres(shared_dir: Path) -> Iterator[str]:
     """The server of this run; the URL of a database that no test uses."""
-    server = EmbeddedServer(shared_dir / "inband", OF_ALL)
+    server = EmbeddedServer((keeper.in_memory() or shared_dir) / "inband", OF_ALL)
     url = server.start()
     follow(server.log)
     try:

@@ -6,6 +6,8 @@ the run has ended, by itself, by Ctrl-C, SIGTERM or SIGKILL, the keeper ends wha
 of the run (prctl(2), PR_SET_CHILD_SUBREAPER), so none escapes. If the keeper itself is killed, the run hears of it
 (PR_SET_PDEATHSIG) and does the same. If both are killed at once, the next run ends what they left.
 
+The keeper also lends the run a folder in memory, for databases that are made and dropped by the thousand, and removes it.
+
 A run that ends by itself and leaves a process behind has failed, and the keeper says which.
 
 This is a plugin (``-p tests.keeper`` in pyproject.toml), because that is read before pytest captures anything. Linux only;
@@ -16,6 +18,7 @@ import contextlib
 import ctypes
 import os
 import re
+import shutil
 import signal
 import sys
 import time
@@ -37,6 +40,7 @@ BY_ITSELF = 60.0
 # PostgreSQL inherits no environment. Its cluster lies in a folder that is locked as long as the run lasts: pytest's, or one
 # of `tests.conftest.short_folder`.
 CLUSTER = re.compile(rb"postgres\0-D\0(/[^\0]*/(?:pytest-of-[^/\0]+/pytest-\d+|inband-test-[^/\0]+))/")
+MEMORY, ROOM = Path("/dev/shm"), 4 * 2**30  # bytes that are free there and in memory, or the run uses the disk  # noqa: S108
 # PostgreSQL waits for its clients at SIGTERM and ends at once at SIGQUIT.
 WAYS = ((signal.SIGTERM, 3.0), (signal.SIGQUIT, 2.0), (signal.SIGKILL, 3.0))
 
@@ -60,7 +64,9 @@ def pytest_testnodedown(error: object | None) -> None:
 def keep() -> None:
     """Return in a child of this process; this process goes on as its keeper and never returns."""
     end(abandoned)
+    _forget()
     os.environ[MARK] = f"{os.getpid()} {_start(os.getpid())}"
+    _borrow()
     heard = {signal.SIGCHLD, signal.SIGINT, signal.SIGTERM, signal.SIGHUP}
     before = signal.pthread_sigmask(signal.SIG_BLOCK, heard)
     prctl(PR_SET_CHILD_SUBREAPER, 1)
@@ -78,6 +84,32 @@ def keep() -> None:
 def mark() -> dict[str, str]:
     """Variable for a process that is started with an environment of its own: by it the next run knows what this one has left."""
     return {name: value for name, value in os.environ.items() if name == MARK}
+
+
+def in_memory() -> Path | None:
+    """A folder in memory that goes with the run; None where there is too little of it."""
+    folder = _folder()
+    return folder if folder.exists() else None
+
+
+def _folder() -> Path:
+    return MEMORY / f"inband-test-{os.environ.get(MARK, '').replace(' ', '-')}"
+
+
+def _borrow() -> None:
+    with contextlib.suppress(OSError, KeyError):  # another system, or somebody else's folder
+        memory = dict(line.split(":") for line in Path("/proc/meminfo").read_text().splitlines())
+        if min(shutil.disk_usage(MEMORY).free, int(memory["MemAvailable"].split()[0]) * 1024) >= ROOM:
+            _folder().mkdir(mode=0o700)
+            (_folder() / ".lock").write_text(str(os.getpid()))
+
+
+def _forget() -> None:
+    """Remove the folders in memory of runs whose keepers have ended."""
+    for folder in MEMORY.glob("inband-test-*-*"):
+        pid, start = folder.name.split("-")[2:]
+        if pid.isdigit() and str(_start(int(pid))) != start:
+            shutil.rmtree(folder, ignore_errors=True)
 
 
 def prctl(option: int, value: int) -> None:
@@ -105,6 +137,7 @@ def _watched(run: int, heard: set[signal.Signals]) -> int:
     if deadline is None and status == 0:
         status = _finished()
     end(descendants)
+    shutil.rmtree(_folder(), ignore_errors=True)
     return status if status >= 0 else 128 - status
 
 
@@ -123,6 +156,7 @@ def _keeper_was_killed(number: int, frame: FrameType | None) -> None:
     """End what the keeper would have ended: what this run has started, and the orphans that had come to the keeper."""
     prctl(PR_SET_CHILD_SUBREAPER, 1)
     end(lambda: [*descendants(), *abandoned()])
+    _forget()
     os._exit(128 + number)
 
 

@@ -135,7 +135,13 @@ class Run:
         """The exit status; by then, there is nothing left."""
         status = self.keeper.wait(60)
         assert self.left == [], self.said
+        assert self.memory == []
         return status
+
+    @property
+    def memory(self) -> list[Path]:
+        """Its folder in memory, until that is removed."""
+        return list(keeper.MEMORY.glob(f"inband-test-{self.keeper.pid}-*"))
 
 
 Begin = Callable[..., Run]
@@ -223,7 +229,7 @@ def test_a_killed_keeper_leaves_nothing(run: Begin) -> None:
     going = run("goes_on", "-n", "2")
     going.workers()
     going.keeper.kill()
-    going.until(lambda: not going.left, "nothing is left")
+    going.until(lambda: not going.left and not going.memory, "nothing is left")
 
 
 @long
@@ -235,7 +241,7 @@ def test_what_is_left_where_both_are_killed_is_ended_by_the_next_run(run: Begin)
     os.kill(controller, signal.SIGKILL)
     going.keeper.kill()
     assert run("leaves_nothing", "-n", "0").ended() == 0
-    going.until(lambda: not going.left, "nothing is left")
+    going.until(lambda: not going.left and not going.memory, "nothing is left")
 
 
 @long
