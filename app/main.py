@@ -125,6 +125,8 @@ from app.views.search import api as search
 from app.views.search import pages as search_pages
 from app.views.search import readings_api as reading_list
 from app.views.set_up import pages as setup_pages
+from app.views.shift import api as shift
+from app.views.shift import pages as shift_pages
 from app.views.station import pages as station_pages
 from app.views.to_do import pages as to_do_pages
 from app.views.to_do.queries import COUNT as TO_DO_COUNT
@@ -150,6 +152,7 @@ ROUTERS: tuple[APIRouter, ...] = (
     capability.router,
     compare.router,
     overview.router,
+    shift.router,
     search.router,
     proof.router,
     wear.router,
@@ -202,6 +205,7 @@ ROUTERS: tuple[APIRouter, ...] = (
     to_do_pages.router,
     compare_pages.router,
     overview_pages.router,
+    shift_pages.router,
     characteristic_pages.router,
     control_pages.router,
     counts_pages.router,

@@ -11,7 +11,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from contextvars import ContextVar
-from datetime import datetime, time, timedelta
+from datetime import UTC, datetime, time, timedelta
 from functools import cache
 from typing import TYPE_CHECKING, NamedTuple
 from zoneinfo import ZoneInfo
@@ -91,6 +91,13 @@ def begin_of_shift(at: datetime) -> datetime:
     days = (there.date(), there.date() - timedelta(1))
     begins = (datetime.combine(day, begin, plant_zone()) for day in days for begin in reversed(_time().shifts))
     return next(begin for begin in begins if begin <= there)
+
+
+def end_of_shift(at: datetime) -> datetime:
+    """The end of the shift in which the moment lies: the beginning of the next one."""
+    days = (local(at).date(), local(at).date() + timedelta(1))
+    begins = (datetime.combine(day, begin, plant_zone()) for day in days for begin in _time().shifts)
+    return next(begin for begin in begins if begin.astimezone(UTC) > at)
 
 
 def shifts_now() -> str:

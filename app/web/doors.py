@@ -12,7 +12,7 @@ Door = Literal["plant", "todo", "quality", "machines", "setup"]
 _BEHIND: dict[Door, re.Pattern[str]] = {
     "plant": re.compile(r"/|/characteristics/[^/]+(/readings/.*)?"),
     "todo": re.compile(r"/(todo|alarms|corrections|proposals|quarantines)(/.*)?"),
-    "quality": re.compile(r"/(overview|compare|characteristics|signals|gauges|reports|parts|ledger)(/.*)?"),
+    "quality": re.compile(r"/(overview|compare|characteristics|signals|gauges|reports|parts|ledger|shift)(/.*)?"),
     "machines": re.compile(
         r"/(machines|connections|plant|tools|calibration|work-zeros|alignments|forms|kinematics|notes)(/.*)?"
         r"|/setup/machines/(?!new$)[^/]+(/.*)?"

@@ -24,6 +24,7 @@ _BEHIND: tuple[tuple[str, str], ...] = (
     (r"/characteristics/[^/]+/(capability|six-pack)|/overview", "how-to/capability"),
     (r"/characteristics/[^/]+/trial(/.*)?", "how-to/shadow-trial"),
     (r"/ledger", "how-to/ledger"),
+    (r"/shift", "how-to/shift"),
     (r"/characteristics/[^/]+/what-if|/proposals(/.*)?", "how-to/what-if"),
     (r"/characteristics/[^/]+/report|/reports", "how-to/reports"),
     (r"/characteristics/[^/]+/readings/.*", "reference/decision"),

@@ -95,6 +95,7 @@ PAGES = {
         "/characteristics/{characteristic}-empty/trial",
     ],
     "/characteristics/{characteristic}/trial/start": ["/characteristics/{characteristic}/trial/start"],
+    "/shift": ["/shift", "/shift?machine={machine}", "/shift?at=2020-01-01"],
     "/ledger": ["/ledger", "/ledger?machine={machine}"],
     "/proposals": ["/proposals", "/proposals?status=all"],
     "/proposals/{number}": ["/proposals/{proposal}"],

@@ -21,6 +21,7 @@ class Alarm(Base):
     __tablename__ = "alarm"
     __table_args__ = (
         Index("alarm_id_key", "id"),
+        Index("alarm_raised_idx", "raised_at"),
         Index("alarm_characteristic_idx", "machine_id", "characteristic_id", "id"),
         Index(
             "alarm_active_characteristic_key",

@@ -20,7 +20,7 @@ def groups() -> list[Group]:
     how_to = [
         (
             _("On the shop floor"),
-            "acknowledge-alarms quarantine stations sizes-by-hand approve-corrections change-tools notifications connections",
+            "acknowledge-alarms quarantine stations sizes-by-hand approve-corrections change-tools notifications shift connections",
         ),
         (
             _("Set up"),

@@ -39,6 +39,7 @@ def doors() -> list[Door]:
         Door(
             _("Ledger"), "/ledger", _("savings, what corrections were worth, cost of rejects, money, over-correction")
         ),
+        Door(_("Shift"), "/shift", _("shift report, handover, parts of the shift, how fast alarms were acknowledged")),
         Door(_("Gauge studies"), "/gauges", _("Cg, Cgk, %GRR, ndc, R&R, bias, linearity, measuring system, MSA")),
         Door(_("Reports"), "/reports", _("PDF, spreadsheet, XLSX, CSV, hand over")),
         Door(_("Find a part"), "/parts", _("serial number, part")),
