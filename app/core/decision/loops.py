@@ -284,7 +284,8 @@ def follow(trace: ProcessTrace, lanes: Rows, delay: int, result: ReplayResult, t
         memory = lane.memory
         if mark & Mark.BEGIN:
             offset, pending = start_offset[begun], start_pending[begun]
-            averages[:] = start_average[begun]
+            for each in range(len(averages)):  # no slice: see `app.core.spc.scan`
+                averages[each] = start_average[begun, each]
             total = rounded(offset + pending)
             begun += 1
             head, waiting, holding = 0, 0, False

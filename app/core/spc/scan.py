@@ -47,7 +47,9 @@ def equal_runs(
             codes[i] = int(z[i] < -limit) | int(z[i] > limit)
     needed = n - 1 if steps else n
     rows = np.empty((len(earlier) + len(z) // max(needed, 1) + 2, 4), np.int64)
-    rows[: len(earlier)] = earlier
+    for row in range(len(earlier)):  # a slice takes three seconds to compile: its error has a text
+        for at in range(4):
+            rows[row, at] = earlier[row, at]
     count = len(earlier)
     code, start = state[0], state[1]
     for i in range(len(z)):
@@ -85,7 +87,9 @@ def beyond_runs(z: Floats, offset: int, side: int, n: int, k: int, limit: float,
     for i in range(len(z)):
         every += int(beyond[n + i])
     rows = np.empty((len(earlier) + every // k + 2, 4), np.int64)
-    rows[: len(earlier)] = earlier
+    for row in range(len(earlier)):  # a slice takes three seconds to compile: its error has a text
+        for at in range(4):
+            rows[row, at] = earlier[row, at]
     count = len(earlier)
     for i in range(len(z)):
         inside += int(beyond[n + i]) - int(beyond[i])
