@@ -27,12 +27,12 @@ def replay(
     """The answer to each line, as the API would give it; a line that cannot be read is passed on."""
     entry = Entry(0, "replay", 0, characteristic)
     memory, location = parameters.average_memory or None, parameters.tool_memory or None
-    snapshot = Snapshot(last_correction={0: 0})
-    snapshot.streams[0] = LoadedStream(entry, 0, 1, parameters, memory, location)
+    snapshot = Snapshot({0: parameters}, last_correction={0: 0})
+    snapshot.streams[0] = LoadedStream(entry=entry, version=1, average=memory, tool=location)
     if memory is not None:
-        snapshot.averages[0, memory] = LoadedAverage(0, memory, 0.0, 0.0)
+        snapshot.averages[0, memory] = LoadedAverage(0, memory)
     if location is not None:
-        snapshot.tools[0, location] = LoadedTool(0, location, 0.0, 0.0, None)
+        snapshot.tools[0, location] = LoadedTool(machine_id=0, number=location)
     pending = PendingWrites(snapshot)
     stream = pending.stream(0)
     tool = stream.tool

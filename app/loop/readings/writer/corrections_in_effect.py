@@ -142,7 +142,15 @@ def confirm(pending: PendingWrites, stream: PendingStream, tool: PendingTool, in
         if (named := pending.named_correction(tool.machine_id, correction.number)) is not None:
             pending.named[tool.machine_id, correction.number] = named._replace(applied_at=at)
         pending.offset_changes.append(
-            OffsetChange(tool.machine_id, tool.number, at, before, tool.offset, correction.number, actor)
+            OffsetChange(
+                machine_id=tool.machine_id,
+                number=tool.number,
+                at=at,
+                offset_before=before,
+                offset_after=tool.offset,
+                correction=correction.number,
+                actor=actor,
+            )
         )
         pending.touched_machines.add(tool.machine_id)
     tool.forget()

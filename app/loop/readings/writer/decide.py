@@ -59,7 +59,7 @@ def _decide_forms(pending: PendingWrites, verdict: Verdict, now: datetime) -> No
     A key that somebody has given another size there before keeps that size: the reading itself is not refused for it.
     """
     reading = verdict.reading
-    for entry, form in verdict.stream.forms:
+    for entry, form in verdict.stream.start.forms:
         value = None if verdict.results is None else verdict.results.form(form)
         if value is None:
             continue
@@ -136,21 +136,20 @@ def decide_reading(pending: PendingWrites, entry: Entry, reading: ReadingIn, now
         if course is not None and not jump and decision.action is not Action.STOP:
             stream.level, stream.level_sequence, stream.level_moved = moved(stream.level, course), sequence, True
     verdict = Verdict(
-        stream,
-        reading,
-        sequence,
-        stream.version,
-        parameters,
-        measured,
-        measured_at,
-        now,
-        late,
-        decision,
-        outstanding,
-        correction,
-        paused_by,
-        alarms,
-        compensated,
+        stream=stream,
+        reading=reading,
+        sequence=sequence,
+        parameters=parameters,
+        measured=measured,
+        measured_at=measured_at,
+        received_at=now,
+        late=late,
+        decision=decision,
+        outstanding=outstanding,
+        correction=correction,
+        paused_by=paused_by,
+        alarms=alarms,
+        compensated=compensated,
         results=results,
     )
     stream.last = verdict
@@ -257,14 +256,14 @@ def _issue(
     else:
         status = "pending"
     correction = PendingCorrection(
-        tool.machine_id,
-        number,
-        tool.number,
-        decision.amount or 0.0,
-        status,
-        stream.entry.characteristic_id,
-        sequence,
-        decision.size_error or 0.0,
+        machine_id=tool.machine_id,
+        number=number,
+        tool_memory=tool.number,
+        amount=decision.amount or 0.0,
+        status=status,
+        characteristic_id=stream.entry.characteristic_id,
+        sequence=sequence,
+        size_error=decision.size_error or 0.0,
         new=True,
     )
     tool.corrections.append(correction)
@@ -297,10 +296,10 @@ def _signal(
         active = stream.alarms.get(signal.value)
     if active is None:
         active = PendingAlarm(
-            entry.machine_id,
-            None if of_tool else entry.characteristic_id,
-            parameters.tool_memory or None,
-            signal.value,
+            machine_id=entry.machine_id,
+            characteristic_id=None if of_tool else entry.characteristic_id,
+            tool_memory=parameters.tool_memory or None,
+            kind=signal.value,
             sequence=sequence,
         )
         pending.raised.append(active)

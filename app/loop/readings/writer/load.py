@@ -11,18 +11,15 @@ from typing import Any
 import msgspec
 
 from app.core.parameters import Parameters
-from app.core.variants import FormResult
 from app.db.pipeline import Pipeline, Step
 from app.loop.readings.records import Entry
 from app.loop.readings.schemas import ReadingIn
 from app.loop.readings.writer.snapshot import (
     KnownKey,
     LoadedAverage,
-    LoadedCorrection,
     LoadedStream,
     LoadedTool,
     NamedCorrection,
-    Part,
     Snapshot,
 )
 from app.loop.readings.writer.statements import LOAD, LOCK, PARAMETERS, array, as_json
@@ -31,33 +28,8 @@ ParametersCache = dict[tuple[int, int], Parameters]
 """Parameters by (characteristic, version). A version never changes, so they are kept for good."""
 
 
-class _Stream(msgspec.Struct, array_like=True):
-    machine_id: int
-    characteristic_id: int
-    sequence: int
-    version: int
-    paused_by: int | None
-    last_measured_at: datetime | None
-    location: int | None
-    average: float | None
-    empirical_value: float | None
-    tool: int | None
-    offset: float | None
-    total: float | None
-    reset_at: datetime | None
-    set_by_hand: bool | None
-    tool_paused_by: int | None
-    level: float | None
-    level_sequence: int | None
-    corrections: list[LoadedCorrection] | None
-    applied: list[tuple[int, float]] | None
-    gain_from: int
-    parts: list[Part] | None
-    forms: list[tuple[int, str, FormResult]] | None
-
-
 class _Loaded(msgspec.Struct):
-    streams: list[_Stream]
+    streams: list[tuple[LoadedStream, LoadedAverage | None, LoadedTool | None]]
     named: list[tuple[int, int, datetime | None, datetime | None, datetime | None]] | None
     known: list[tuple[int, str, int, float, int]] | None
 
@@ -78,9 +50,8 @@ async def load(
     optimistic: take the keys for new ones. If one is not, `save` will fail with a `UniqueViolation`.
     """
     machines = _machines(readings)
-    await _load(
-        pipeline, book, snapshot, readings, machines, (*pipeline.begin, (LOCK, array(machines))), optimistic=optimistic
-    )
+    opening = (*pipeline.begin, (LOCK, array(machines)))
+    await _load(pipeline, book, snapshot, readings, machines, opening, optimistic=optimistic)
     if of_form := [
         (form, reading)
         for entry, reading in readings
@@ -102,10 +73,7 @@ async def _load(
     """Bring the state of these readings into the snapshot. opening: begins the transaction and locks; empty if that is done."""
     entries = {entry.characteristic_id: entry for entry, _ in readings}
     document = {
-        "streams": [
-            {"machine_id": e.machine_id, "characteristic_id": e.characteristic_id, **machines[e.machine_id]}
-            for e in entries.values()
-        ],
+        "streams": [{**e._asdict(), **machines[e.machine_id]} for e in entries.values()],
         "named": [
             {"machine_id": machine_id, "number": number}
             for machine_id, number in {
@@ -128,14 +96,16 @@ async def _load(
         snapshot.last_correction[machine_id], snapshot.versions[machine_id] = last, version
     for machine_id, number, applied_at, decided_at, fetched_at in loaded.named or ():
         snapshot.named[machine_id, number] = NamedCorrection(applied_at, decided_at, fetched_at)
-        if applied_at is not None:
-            since = machines[machine_id]["since"]
-            machines[machine_id]["since"] = applied_at if since is None else min(since, applied_at)
-    for row in loaded.streams:
-        parameters = await _parameters(pipeline, book, row.machine_id, row.characteristic_id, row.version)
-        _add_stream(snapshot, entries[row.characteristic_id], parameters, row, **machines[row.machine_id])
+    for stream, average, tool in loaded.streams:
+        c = stream.entry.characteristic_id
+        snapshot.parameters[c] = await _parameters(pipeline, book, stream.entry, stream.version)
+        snapshot.streams[c] = stream
+        if average is not None:
+            snapshot.averages[average.machine_id, average.location] = average
+        if tool is not None:
+            snapshot.tools[tool.machine_id, tool.number] = tool
     for c, key, sequence, measured, version in loaded.known or ():
-        parameters = await _parameters(pipeline, book, entries[c].machine_id, c, version)
+        parameters = await _parameters(pipeline, book, entries[c], version)
         snapshot.stored_keys[c, key] = KnownKey(sequence, measured, parameters)
 
 
@@ -154,51 +124,11 @@ def _machines(readings: Iterable[tuple[Entry, ReadingIn]]) -> dict[int, dict[str
     return machines
 
 
-async def _parameters(
-    pipeline: Pipeline, book: ParametersCache, machine_id: int, characteristic_id: int, version: int
-) -> Parameters:
-    parameters = book.get((characteristic_id, version))
+async def _parameters(pipeline: Pipeline, book: ParametersCache, entry: Entry, version: int) -> Parameters:
+    at = (entry.characteristic_id, version)
+    parameters = book.get(at)
     if parameters is None:
-        place = {"machine_id": machine_id, "characteristic_id": characteristic_id, "version": version}
+        place = {"machine_id": entry.machine_id, "characteristic_id": entry.characteristic_id, "version": version}
         (((text,),),) = await pipeline.run(((PARAMETERS, as_json(place)),))  # a version that is named is there
-        parameters = book[characteristic_id, version] = Parameters.from_dict(msgspec.json.decode(text or b""))
+        parameters = book[at] = Parameters.from_dict(msgspec.json.decode(text or b""))
     return parameters
-
-
-def _add_stream(
-    snapshot: Snapshot, entry: Entry, parameters: Parameters, row: _Stream, number: int | None, since: datetime | None
-) -> None:
-    machine_id = row.machine_id
-    if row.location is not None:
-        snapshot.averages[machine_id, row.location] = LoadedAverage(
-            machine_id, row.location, row.average or 0.0, row.empirical_value or 0.0
-        )
-    if row.tool is not None:
-        snapshot.tools[machine_id, row.tool] = LoadedTool(
-            machine_id,
-            row.tool,
-            row.offset or 0.0,
-            row.total or 0.0,
-            row.reset_at,
-            row.tool_paused_by,
-            row.corrections or (),
-            number,
-            since,
-            row.applied or (),
-            bool(row.set_by_hand),
-        )
-    snapshot.streams[row.characteristic_id] = LoadedStream(
-        entry,
-        row.sequence,
-        row.version,
-        parameters,
-        row.location,
-        row.tool,
-        row.paused_by,
-        row.last_measured_at,
-        row.level,
-        row.level_sequence,
-        row.gain_from,
-        row.parts or (),
-        [(entry._replace(characteristic_id=number, characteristic=key), form) for number, key, form in row.forms or ()],
-    )

@@ -31,7 +31,7 @@ def pauses(pending: PendingWrites, stream: PendingStream, newest: Part) -> Pendi
     """
     tool = stream.tool
     parts = [*stream.parts[1 - LONGEST :], newest]
-    begin = sum(part.sequence <= stream.gain_from for part in parts)
+    begin = sum(part.sequence <= stream.start.gain_from for part in parts)
     if tool is None or len(parts) - begin < 3:
         return None
     parameters = stream.parameters
@@ -45,10 +45,10 @@ def pauses(pending: PendingWrites, stream: PendingStream, newest: Part) -> Pendi
     if found is None:
         return None
     alarm = PendingAlarm(
-        tool.machine_id,
-        None,
-        tool.number,
-        OPPOSITE,
+        machine_id=tool.machine_id,
+        characteristic_id=None,
+        tool_memory=tool.number,
+        kind=OPPOSITE,
         sequence=newest.sequence,
         last_sequence=newest.sequence,
         count=1,
@@ -71,7 +71,7 @@ def name_correction(alarms: Sequence[PendingAlarm], stream: PendingStream, newes
     """Say in alarms about a deviation that the newest correction moved the size the wrong way, if it did: the sign may be the cause."""
     if not alarms or newest is None or stream.tool is None:
         return
-    parts = [part for part in stream.parts[1 - LONGEST :] if part.sequence > stream.gain_from] + [newest]
+    parts = [part for part in stream.parts[1 - LONGEST :] if part.sequence > stream.start.gain_from] + [newest]
     parameters = stream.parameters
     found = against(
         np.array([part.deviation for part in parts]),

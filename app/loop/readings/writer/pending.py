@@ -10,10 +10,12 @@ from dataclasses import dataclass, field
 from datetime import datetime
 from typing import Any, NamedTuple
 
+from msgspec import structs
+
 from app.core.decision.decide import Decision
 from app.core.gain import LONGEST
 from app.core.parameters import Parameters
-from app.core.variants import FormResult, Results
+from app.core.variants import Results
 from app.loop.readings.records import Entry, Record
 from app.loop.readings.schemas import ReadingIn
 from app.loop.readings.writer.snapshot import (
@@ -30,7 +32,7 @@ from app.loop.readings.writer.snapshot import (
 from app.loop.tables.tools import OPEN, OPPOSED
 
 
-@dataclass(slots=True)
+@dataclass(slots=True, kw_only=True)
 class PendingAlarm:
     """An alarm that these readings raise. `save` learns if it is active already, or draws a number for it."""
 
@@ -51,7 +53,7 @@ def alarm_number(alarm: int | PendingAlarm | None) -> int | None:
     return alarm.id if isinstance(alarm, PendingAlarm) else alarm
 
 
-@dataclass(slots=True)
+@dataclass(slots=True, kw_only=True)
 class PendingCorrection:
     """A correction that these readings issue (`new`), or change. mm."""
 
@@ -74,15 +76,7 @@ class PendingCorrection:
 
     def loaded(self) -> LoadedCorrection:
         """Return it as the database holds it after the commit."""
-        return LoadedCorrection(
-            self.number,
-            self.amount,
-            self.status,
-            self.applied_at,
-            self.decided_at,
-            self.fetched_at,
-            self.characteristic_id,
-        )
+        return LoadedCorrection(**{name: getattr(self, name) for name in LoadedCorrection._fields})
 
 
 @dataclass(slots=True)
@@ -107,23 +101,25 @@ class EffectTally:
     applied_since: list[float] = field(default_factory=list)
 
 
-@dataclass(slots=True)
+@dataclass(slots=True, kw_only=True)
 class PendingTool:
-    """A location of the tool memory as these readings move it. mm."""
+    """A location of the tool memory as these readings move it. mm.
+
+    tallies: worked out of `corrections`. none_held: so many of the first of them are known not to be held.
+    """
 
     machine_id: int
     number: int
-    offset: float
-    total: float
-    reset_at: datetime | None
+    offset: float = 0.0
+    total: float = 0.0
+    reset_at: datetime | None = None
+    set_by_hand: bool = False
     paused_by: int | PendingAlarm | None = None
     corrections: list[LoadedCorrection | PendingCorrection] = field(default_factory=list)
     applied: list[tuple[int, float]] = field(default_factory=list)
     changed: bool = False
-    # Worked out of `corrections`, and how many of the first ones are known not to be held.
     tallies: dict[int | None, EffectTally] = field(default_factory=dict)
     none_held: int = 0
-    set_by_hand: bool = False
 
     def forget(self) -> None:
         """Drop what was worked out of the corrections: there are others, or one has another status."""
@@ -134,15 +130,7 @@ class PendingTool:
         correction = self.corrections[at]
         if isinstance(correction, LoadedCorrection):
             correction = self.corrections[at] = PendingCorrection(
-                self.machine_id,
-                correction.number,
-                self.number,
-                correction.amount,
-                correction.status,
-                correction.characteristic_id,
-                applied_at=correction.applied_at,
-                decided_at=correction.decided_at,
-                fetched_at=correction.fetched_at,
+                machine_id=self.machine_id, tool_memory=self.number, **correction._asdict()
             )
         return correction
 
@@ -166,7 +154,7 @@ class PendingTool:
         return [c for c in self.corrections if isinstance(c, PendingCorrection)]
 
 
-@dataclass(slots=True)
+@dataclass(slots=True, kw_only=True)
 class PendingAverage:
     """A location of the average memory as these readings move it. mm."""
 
@@ -177,48 +165,39 @@ class PendingAverage:
     changed: bool = False
 
 
-@dataclass(slots=True)
+@dataclass(slots=True, kw_only=True)
 class PendingStream:
-    """The running state of one characteristic as these readings move it."""
+    """The running state of one characteristic as these readings move it. start: as it was before them."""
 
+    start: LoadedStream
     entry: Entry
-    sequence: int
-    version: int
     parameters: Parameters
+    sequence: int
     average: PendingAverage | None
     tool: PendingTool | None
     paused_by: int | PendingAlarm | None
     last_measured_at: datetime | None
-    level: float | None = None
-    level_sequence: int | None = None
+    level: float | None
+    level_sequence: int | None
+    parts: list[Part]
     level_moved: bool = False
-    gain_from: int = 0
-    parts: list[Part] = field(default_factory=list)
-    forms: Sequence[tuple[Entry, FormResult]] = ()
     alarms: dict[str, PendingAlarm] = field(default_factory=dict)
-    before: int = 0  # sequence in the snapshot
     last: "Verdict | None" = None
 
     def loaded(self) -> LoadedStream:
         """Return it as the database holds it after the commit."""
-        return LoadedStream(
-            self.entry,
-            self.sequence,
-            self.version,
-            self.parameters,
-            None if self.average is None else self.average.location,
-            None if self.tool is None else self.tool.number,
-            alarm_number(self.paused_by),
-            self.last_measured_at,
-            self.level,
-            self.level_sequence,
-            self.gain_from,
-            self.parts[-LONGEST:],
-            self.forms,
+        return structs.replace(
+            self.start,
+            sequence=self.sequence,
+            paused_by=alarm_number(self.paused_by),
+            last_measured_at=self.last_measured_at,
+            level=self.level,
+            level_sequence=self.level_sequence,
+            parts=self.parts[-LONGEST:],
         )
 
 
-@dataclass(slots=True)
+@dataclass(slots=True, kw_only=True)
 class OffsetChange:
     """A change of a tool offset to be written into its history. mm."""
 
@@ -260,46 +239,43 @@ class PendingWrites:
         """Return the state of a characteristic as the readings before have left it."""
         stream = self.streams.get(characteristic_id)
         if stream is None:
-            loaded = self.snapshot.streams[characteristic_id]
-            machine_id = loaded.entry.machine_id
+            start = self.snapshot.streams[characteristic_id]
+            machine_id = start.entry.machine_id
             stream = self.streams[characteristic_id] = PendingStream(
-                loaded.entry,
-                loaded.sequence,
-                loaded.version,
-                loaded.parameters,
-                None if loaded.average is None else self._average((machine_id, loaded.average)),
-                None if loaded.tool is None else self._tool((machine_id, loaded.tool)),
-                loaded.paused_by,
-                loaded.last_measured_at,
-                loaded.level,
-                loaded.level_sequence,
-                gain_from=loaded.gain_from,
-                parts=list(loaded.parts),
-                forms=loaded.forms,
-                before=loaded.sequence,
+                start=start,
+                entry=start.entry,
+                parameters=self.snapshot.parameters[characteristic_id],
+                sequence=start.sequence,
+                average=None if start.average is None else self._average((machine_id, start.average)),
+                tool=None if start.tool is None else self._tool((machine_id, start.tool)),
+                paused_by=start.paused_by,
+                last_measured_at=start.last_measured_at,
+                level=start.level,
+                level_sequence=start.level_sequence,
+                parts=list(start.parts),
             )
         return stream
 
     def _average(self, at: tuple[int, int]) -> PendingAverage:
         average = self.averages.get(at)
         if average is None:
-            average = self.averages[at] = PendingAverage(*self.snapshot.averages[at])
+            average = self.averages[at] = PendingAverage(**self.snapshot.averages[at]._asdict())
         return average
 
     def _tool(self, at: tuple[int, int]) -> PendingTool:
         tool = self.tools.get(at)
         if tool is None:
-            loaded = self.snapshot.tools[at]
+            start = self.snapshot.tools[at]
             tool = self.tools[at] = PendingTool(
-                loaded.machine_id,
-                loaded.number,
-                loaded.offset,
-                loaded.total,
-                loaded.reset_at,
-                loaded.paused_by,
-                list(loaded.corrections),
-                list(loaded.applied),
-                set_by_hand=loaded.set_by_hand,
+                machine_id=start.machine_id,
+                number=start.number,
+                offset=start.offset,
+                total=start.total,
+                reset_at=start.reset_at,
+                set_by_hand=start.set_by_hand,
+                paused_by=start.paused_by,
+                corrections=list(start.corrections),
+                applied=list(start.applied),
             )
         return tool
 
@@ -337,7 +313,8 @@ class PendingWrites:
         snapshot.named |= {(c.machine_id, c.number): NamedCorrection(None, None) for c in self.issued}
 
     def _settled(self, tool: PendingTool) -> LoadedTool:
-        return self.snapshot.tools[tool.machine_id, tool.number]._replace(
+        return structs.replace(
+            self.snapshot.tools[tool.machine_id, tool.number],
             offset=tool.offset,
             total=tool.total,
             paused_by=alarm_number(tool.paused_by),
@@ -350,14 +327,13 @@ class PendingWrites:
         )
 
 
-@dataclass(slots=True)
+@dataclass(slots=True, kw_only=True)
 class Verdict:
     """A decided reading, before its alarms have numbers."""
 
     stream: PendingStream
     reading: ReadingIn
     sequence: int
-    version: int
     parameters: Parameters
     measured: float
     measured_at: datetime
@@ -381,30 +357,30 @@ class Verdict:
     def _row(self) -> Record:
         d, r, entry = self.decision, self.reading, self.stream.entry
         return Record(
-            entry.machine_id,
-            entry.characteristic_id,
-            self.sequence,
-            self.measured,
-            d.deviation,
-            d.decided,
-            d.average_before,
-            d.average_after,
-            self.measured_at,
-            self.received_at,
-            r.machined_at,
-            self.version,
-            r.correction_in_effect,
-            self.correction.number if self.correction else None,
-            alarm_number(self.paused_by),
-            self.late,
-            d.zone.value,
-            d.action.value,
-            d.code.value,
-            r.key,
-            r.part,
-            self.outstanding or None,
-            [alarm.id or 0 for alarm in self.alarms] or None,
-            self.compensated,
+            machine_id=entry.machine_id,
+            characteristic_id=entry.characteristic_id,
+            sequence=self.sequence,
+            measured=self.measured,
+            deviation=d.deviation,
+            decided=d.decided,
+            average_before=d.average_before,
+            average_after=d.average_after,
+            measured_at=self.measured_at,
+            received_at=self.received_at,
+            machined_at=r.machined_at,
+            parameters_version=self.stream.start.version,
+            correction_in_effect=r.correction_in_effect,
+            correction=self.correction.number if self.correction else None,
+            paused_by=alarm_number(self.paused_by),
+            late=self.late,
+            zone=d.zone.value,
+            action=d.action.value,
+            code=d.code.value,
+            key=r.key,
+            part=r.part,
+            outstanding=self.outstanding or None,
+            alarms=[alarm.id or 0 for alarm in self.alarms] or None,
+            compensated=self.compensated,
         )
 
 

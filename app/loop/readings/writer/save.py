@@ -89,7 +89,7 @@ async def save(pipeline: Pipeline, pending: PendingWrites, *, begun: bool, notif
             *((statement, as_json(rows)) for statement, rows in _rarer(pending) if rows),
             *(
                 (statement, as_json(blocks))
-                for statement, blocks in full_blocks([(s.entry, s.before, s.sequence) for s in touched])
+                for statement, blocks in full_blocks([(s.entry, s.start.sequence, s.sequence) for s in touched])
             ),
             *([("COMMIT",)] if begun else []),
         )

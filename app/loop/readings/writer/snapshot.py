@@ -9,6 +9,8 @@ from dataclasses import dataclass, field
 from datetime import datetime
 from typing import NamedTuple
 
+import msgspec
+
 from app.core.parameters import Parameters
 from app.core.variants import FormResult
 from app.loop.readings.records import Entry
@@ -44,25 +46,25 @@ class NamedCorrection(NamedTuple):
     fetched_at: datetime | None = None
 
 
-class LoadedTool(NamedTuple):
+class LoadedTool(msgspec.Struct, frozen=True, kw_only=True, array_like=True):
     """One location of the tool memory (R10), with its corrections in the order of their numbers. mm.
 
-    paused_by: the alarm that pauses it. Of the applied corrections there are those with a higher number
-    than `since_number`, and those applied after `since`. applied: numbers and amounts of the newest, to name them by.
-    set_by_hand: somebody has set the offset since the tool was changed.
+    set_by_hand: somebody has set the offset since the tool was changed. paused_by: the alarm that pauses it. Of the applied
+    corrections there are those with a higher number than `since_number`, and those applied after `since`. applied: numbers
+    and amounts of the newest, to name them by.
     """
 
     machine_id: int
     number: int
-    offset: float
-    total: float
-    reset_at: datetime | None
+    offset: float = 0.0
+    total: float = 0.0
+    reset_at: datetime | None = None
+    set_by_hand: bool = False
     paused_by: int | None = None
     corrections: Sequence[LoadedCorrection] = ()
     since_number: int | None = None
     since: datetime | None = None
     applied: Sequence[tuple[int, float]] = ()
-    set_by_hand: bool = False
 
 
 class LoadedAverage(NamedTuple):
@@ -70,8 +72,8 @@ class LoadedAverage(NamedTuple):
 
     machine_id: int
     location: int
-    average: float
-    empirical_value: float
+    average: float = 0.0
+    empirical_value: float = 0.0
 
 
 class Part(NamedTuple):
@@ -82,7 +84,7 @@ class Part(NamedTuple):
     compensated: float
 
 
-class LoadedStream(NamedTuple):
+class LoadedStream(msgspec.Struct, frozen=True, kw_only=True, array_like=True):
     """The state of one characteristic after its last reading.
 
     average, tool: locations, None without one. level: the deviation expected without corrections, mm; kept where jumps
@@ -91,9 +93,8 @@ class LoadedStream(NamedTuple):
     """
 
     entry: Entry
-    sequence: int
+    sequence: int = 0
     version: int
-    parameters: Parameters
     average: int | None
     tool: int | None
     paused_by: int | None = None
@@ -120,6 +121,7 @@ class Snapshot:
     Keys: characteristic; (machine, location); machine; (machine, correction); (characteristic, key of a reading).
     """
 
+    parameters: dict[int, Parameters] = field(default_factory=dict)
     streams: dict[int, LoadedStream] = field(default_factory=dict)
     tools: dict[tuple[int, int], LoadedTool] = field(default_factory=dict)
     averages: dict[tuple[int, int], LoadedAverage] = field(default_factory=dict)
@@ -150,5 +152,5 @@ class Snapshot:
 
     def forget(self) -> None:
         """Forget everything that was loaded; only keys of this transaction stay."""
-        self.streams, self.tools, self.averages = {}, {}, {}
+        self.parameters, self.streams, self.tools, self.averages = {}, {}, {}, {}
         self.last_correction, self.versions, self.named = {}, {}, {}

@@ -48,7 +48,8 @@ guard AS MATERIALIZED (SELECT 1 / (count(*) = json_array_length($1))::int FROM c
 GUARD = f"WITH {_GUARD} SELECT * FROM guard"  # noqa: S608 - made of constants
 # One statement for all that is needed, as one JSON document, because each statement costs more than what it reads here.
 # Corrections of a tool: the open ones, and those applied since the oldest correction or time that a reading names, or with it if
-# they had waited for a person; `named` are the corrections that readings name as the last ones in effect.
+# they had waited for a person; `named` are the corrections that readings name as the last ones in effect. The order is that of
+# the fields of `LoadedStream`, `LoadedAverage` and `LoadedTool`.
 # The row comparison with the keys can only be had from their own index; plain equalities the planner may also answer by
 # walking the primary key through every reading of the characteristic.
 LOAD = f"""
@@ -61,51 +62,67 @@ named AS MATERIALIZED (
 )
 SELECT json_build_object(
     'streams', (
-        SELECT json_agg(json_build_array(s.machine_id, s.characteristic_id, s.sequence, s.parameters_version, s.paused_by,
-            s.last_measured_at, a.location, a.average, a.empirical_value, t.number, t."offset", t.total, t.reset_at,
-            t.reset_at > coalesce(t.changed_at, '-infinity'), t.paused_by, s.level, s.level_sequence,
-            CASE WHEN t.number IS NOT NULL THEN (
-                SELECT json_agg(json_build_array(
-                    c.number, c.amount, c.status, c.applied_at, c.decided_at, c.fetched_at) ORDER BY c.number) FROM (
-                    SELECT number, amount, status, applied_at, decided_at, fetched_at FROM correction
-                    WHERE machine_id = t.machine_id AND tool_memory = t.number
-                        AND status IN ('held', 'awaiting_approval', 'pending')
-                    UNION ALL
-                    SELECT number, amount, status, applied_at, decided_at, fetched_at FROM correction
-                    WHERE machine_id = t.machine_id AND tool_memory = t.number AND status = 'applied'
-                        AND number > w.number
-                    UNION ALL
-                    SELECT number, amount, status, applied_at, decided_at, fetched_at FROM correction
-                    WHERE machine_id = t.machine_id AND tool_memory = t.number AND status = 'applied'
-                        AND (applied_at, decided_at IS NOT NULL) >= (least(
-                            w.since, (SELECT min(n.applied_at) FROM named n WHERE n.machine_id = t.machine_id)
-                        ), true) AND (number <= w.number OR w.number IS NULL)
-                ) c
-            ) END,
-            CASE WHEN t.number IS NOT NULL THEN (
-                SELECT json_agg(json_build_array(c.number, c.amount) ORDER BY c.number) FROM (
-                    SELECT number, amount FROM correction
-                    WHERE machine_id = t.machine_id AND tool_memory = t.number AND status = 'applied'
-                    ORDER BY number DESC LIMIT {MOST_APPLIED}
-                ) c
-            ) END,
-            s.gain_from,
-            CASE WHEN t.number IS NOT NULL THEN (
-                SELECT json_agg(json_build_array(r.sequence, r.deviation, r.compensated) ORDER BY r.sequence) FROM reading r
-                WHERE r.machine_id = s.machine_id AND r.characteristic_id = s.characteristic_id
-                    AND r.sequence > s.sequence - {LONGEST} AND r.compensated IS NOT NULL AND NOT r.late
-                    AND r.zone <> 'probe_fault' AND r.code NOT IN ('implausible', 'imported')
-                    AND NOT EXISTS (
-                        SELECT FROM exclusion e WHERE e.machine_id = r.machine_id
-                            AND e.characteristic_id = r.characteristic_id AND e.sequence = r.sequence
-                    )
-            ) END,
-            (
-                SELECT json_agg(json_build_array(f.id, f.key, f.form) ORDER BY f.id) FROM characteristic f
-                WHERE f.machine_id = s.machine_id AND f.form_of = s.characteristic_id
-            )))
-        FROM json_to_recordset((SELECT d -> 'streams' FROM doc))
-            AS w(machine_id int, characteristic_id int, number int, since timestamptz)
+        SELECT json_agg(json_build_array(
+            json_build_array(
+                json_build_array(w.machine_id, w.machine, w.characteristic_id, w.characteristic),
+                s.sequence, s.parameters_version, a.location, t.number, s.paused_by, s.last_measured_at, s.level,
+                s.level_sequence, s.gain_from,
+                coalesce(CASE WHEN t.number IS NOT NULL THEN (
+                    SELECT json_agg(json_build_array(r.sequence, r.deviation, r.compensated) ORDER BY r.sequence)
+                    FROM reading r
+                    WHERE r.machine_id = s.machine_id AND r.characteristic_id = s.characteristic_id
+                        AND r.sequence > s.sequence - {LONGEST} AND r.compensated IS NOT NULL AND NOT r.late
+                        AND r.zone <> 'probe_fault' AND r.code NOT IN ('implausible', 'imported')
+                        AND NOT EXISTS (
+                            SELECT FROM exclusion e WHERE e.machine_id = r.machine_id
+                                AND e.characteristic_id = r.characteristic_id AND e.sequence = r.sequence
+                        )
+                ) END, '[]'),
+                coalesce((
+                    SELECT json_agg(json_build_array(json_build_array(w.machine_id, w.machine, f.id, f.key), f.form)
+                        ORDER BY f.id)
+                    FROM characteristic f WHERE f.machine_id = s.machine_id AND f.form_of = s.characteristic_id
+                ), '[]')
+            ),
+            CASE WHEN a.location IS NOT NULL THEN
+                json_build_array(a.machine_id, a.location, a.average, a.empirical_value)
+            END,
+            CASE WHEN t.number IS NOT NULL THEN json_build_array(
+                t.machine_id, t.number, t."offset", t.total, t.reset_at,
+                coalesce(t.reset_at > coalesce(t.changed_at, '-infinity'), false), t.paused_by,
+                coalesce((
+                    SELECT json_agg(json_build_array(
+                        c.number, c.amount, c.status, c.applied_at, c.decided_at, c.fetched_at) ORDER BY c.number) FROM (
+                        SELECT number, amount, status, applied_at, decided_at, fetched_at FROM correction
+                        WHERE machine_id = t.machine_id AND tool_memory = t.number
+                            AND status IN ('held', 'awaiting_approval', 'pending')
+                        UNION ALL
+                        SELECT number, amount, status, applied_at, decided_at, fetched_at FROM correction
+                        WHERE machine_id = t.machine_id AND tool_memory = t.number AND status = 'applied'
+                            AND number > w.number
+                        UNION ALL
+                        SELECT number, amount, status, applied_at, decided_at, fetched_at FROM correction
+                        WHERE machine_id = t.machine_id AND tool_memory = t.number AND status = 'applied'
+                            AND (applied_at, decided_at IS NOT NULL) >= (w.since, true)
+                            AND (number <= w.number OR w.number IS NULL)
+                    ) c
+                ), '[]'),
+                w.number, w.since,
+                coalesce((
+                    SELECT json_agg(json_build_array(c.number, c.amount) ORDER BY c.number) FROM (
+                        SELECT number, amount FROM correction
+                        WHERE machine_id = t.machine_id AND tool_memory = t.number AND status = 'applied'
+                        ORDER BY number DESC LIMIT {MOST_APPLIED}
+                    ) c
+                ), '[]')
+            ) END))
+        FROM (
+            SELECT machine_id, machine, characteristic_id, characteristic, number, least(
+                w.since, (SELECT min(n.applied_at) FROM named n WHERE n.machine_id = w.machine_id)
+            ) AS since
+            FROM json_to_recordset((SELECT d -> 'streams' FROM doc)) AS w(machine_id int, machine text,
+                characteristic_id int, characteristic text, number int, since timestamptz)
+        ) w
         JOIN stream s ON s.machine_id = w.machine_id AND s.characteristic_id = w.characteristic_id
         LEFT JOIN average_memory a ON a.machine_id = s.machine_id AND a.location = s.average_memory
         LEFT JOIN tool t ON t.machine_id = s.machine_id AND t.number = s.tool_memory

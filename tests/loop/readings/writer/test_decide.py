@@ -30,10 +30,10 @@ NOW = datetime(2026, 11, 21, 8, 0, tzinfo=UTC)
 
 
 def pending_writes(parameters: Parameters | None = None) -> PendingWrites:
-    snapshot = Snapshot(last_correction={1: 0}, versions={1: 0})
-    snapshot.tools[1, 3] = LoadedTool(1, 3, 0.0, 0.0, None)
-    snapshot.averages[1, 5] = LoadedAverage(1, 5, 0.0, 0.0)
-    snapshot.streams[1] = LoadedStream(ENTRY, 0, 1, parameters or read(PARAMETERS)[0], 5, 3)
+    snapshot = Snapshot({1: parameters or read(PARAMETERS)[0]}, last_correction={1: 0}, versions={1: 0})
+    snapshot.tools[1, 3] = LoadedTool(machine_id=1, number=3)
+    snapshot.averages[1, 5] = LoadedAverage(1, 5)
+    snapshot.streams[1] = LoadedStream(entry=ENTRY, version=1, average=5, tool=3)
     return PendingWrites(snapshot)
 
 

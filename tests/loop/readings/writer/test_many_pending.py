@@ -32,10 +32,10 @@ COUNT = 300
 
 
 def pending_on(*corrections: LoadedCorrection, **parameters: Any) -> PendingWrites:
-    snapshot = Snapshot(last_correction={1: 0}, versions={1: 0})
-    snapshot.tools[1, 3] = LoadedTool(1, 3, 0.0, 0.0, None, corrections=corrections)
-    snapshot.averages[1, 5] = LoadedAverage(1, 5, 0.0, 0.0)
-    snapshot.streams[1] = LoadedStream(ENTRY, 0, 1, read(PARAMETERS | parameters)[0], 5, 3)
+    snapshot = Snapshot({1: read(PARAMETERS | parameters)[0]}, last_correction={1: 0}, versions={1: 0})
+    snapshot.tools[1, 3] = LoadedTool(machine_id=1, number=3, corrections=corrections)
+    snapshot.averages[1, 5] = LoadedAverage(1, 5)
+    snapshot.streams[1] = LoadedStream(entry=ENTRY, version=1, average=5, tool=3)
     return PendingWrites(snapshot)
 
 

@@ -30,12 +30,13 @@ class Shift:
         self.rng = Random(seed)
         self.factors, self.delay, self.how = factors, delay, how
         snapshot = Snapshot(last_correction={1: 0})
-        snapshot.tools[1, 3] = LoadedTool(1, 3, 0.0, 0.0, None)
+        snapshot.tools[1, 3] = LoadedTool(machine_id=1, number=3)
         for entry, factor in zip(ENTRIES, factors, strict=True):
             memory = entry.characteristic_id
             snapshot.averages[1, memory] = LoadedAverage(1, memory, 0.0, 0.0002)
             chosen = {"factor": factor, "average_memory": memory, "mode": mode, "wear_policy": policy, "max_step": 0.5}
-            snapshot.streams[memory] = LoadedStream(entry, 0, 1, read(PARAMETERS | chosen)[0], memory, 3)
+            snapshot.parameters[memory] = read(PARAMETERS | chosen)[0]
+            snapshot.streams[memory] = LoadedStream(entry=entry, version=1, average=memory, tool=3)
         self.pending = PendingWrites(snapshot)
         tool = self.pending.stream(ENTRIES[0].characteristic_id).tool
         assert tool is not None
