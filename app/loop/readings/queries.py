@@ -36,7 +36,7 @@ from app.loop.tables.readings import (
 from app.loop.tables.tools import Correction
 from app.web.fields import is_slug
 
-COLUMNS = [getattr(Reading, name) for name in Record._fields]
+COLUMNS = [getattr(Reading, name) for name in Record.__struct_fields__]
 _RESULTS = [getattr(ReadingResults, name) for name in Results._fields]
 
 

@@ -4,6 +4,8 @@ from collections.abc import Sequence
 from datetime import datetime
 from typing import NamedTuple
 
+import msgspec
+
 MOST_OUTSTANDING = 100  # numbers stored with a reading; a machine that never confirms leaves ever more of them open
 
 
@@ -16,7 +18,7 @@ class Entry(NamedTuple):
     characteristic: str
 
 
-class Record(NamedTuple):
+class Record(msgspec.Struct, frozen=True):
     """One row of the table `reading`, in the order of its columns."""
 
     machine_id: int

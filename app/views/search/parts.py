@@ -48,7 +48,7 @@ def measured(session: Session, part: str, after: str | None, limit: int) -> list
     if not records:
         return []
     of = (Characteristic.machine_id, Characteristic.id)
-    places = {record[:1] + record[1:2] for record in records}
+    places = {(record.machine_id, record.characteristic_id) for record in records}
     names = {
         (row.machine_id, row.id): (row.name, row.key, row.machine)
         for row in session.execute(

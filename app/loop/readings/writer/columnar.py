@@ -301,7 +301,7 @@ class ColumnarReadings:
             "alarms": null,
             "compensated": fixed(compensated, ">f8", np.isnan(compensated)),
         }
-        return table([columns[name] for name in Record._fields], len(at))
+        return table([columns[name] for name in Record.__struct_fields__], len(at))
 
 
 Outcome = Verdict | ColumnarReadings | Stored | InbandError

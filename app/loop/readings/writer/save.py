@@ -7,6 +7,8 @@ a transaction cannot be had through the actions that serve one person at a time.
 from collections.abc import Iterable
 from typing import Any
 
+from msgspec import structs
+
 from app.db.pipeline import Pipeline, Step
 from app.loop.readings.records import Entry, Record
 from app.loop.readings.writer.binary_copy import array_of_int4
@@ -82,7 +84,7 @@ async def save(pipeline: Pipeline, pending: PendingWrites, *, begun: bool, notif
                         if a is not None and a.changed
                     ]
                 ),
-                as_json([] if copying else [record._asdict() for record in records]),
+                as_json([] if copying else records),
                 as_json(_changes(pending, touched)),
                 str(notify),
             ),
@@ -129,7 +131,7 @@ async def _copy(pipeline: Pipeline, records: list[Record]) -> None:
         copy.set_types(COPY_TYPES)
         for record in records:
             outstanding = array_of_int4(record.outstanding) if record.outstanding else None
-            await copy.write_row(record._replace(outstanding=outstanding))
+            await copy.write_row(structs.astuple(structs.replace(record, outstanding=outstanding)))
 
 
 def _stream_row(stream: PendingStream) -> dict[str, Any]:

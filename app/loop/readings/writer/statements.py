@@ -155,7 +155,7 @@ _READING = """machine_id int4, characteristic_id int4, sequence int8, measured f
     machined_at timestamptz, parameters_version int4, correction_in_effect int4, correction int4, paused_by int8,
     late bool, zone text, action text, code text, key text, part text, outstanding int4[], alarms int8[],
     compensated float8"""
-_COLUMNS = ", ".join(Record._fields)
+_COLUMNS = ", ".join(Record.__struct_fields__)
 # A column that the writer encodes itself goes out as the bytes it is: COPY sends no types.
 COPY_TYPES = ["bytea" if column.split()[0] == "outstanding" else column.split()[1] for column in _READING.split(",")]
 MOVE_STREAMS = """

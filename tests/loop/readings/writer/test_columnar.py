@@ -22,7 +22,7 @@ from tests.shop import Shop
 
 pytestmark = pytest.mark.own_server  # the whole record of its database is held against the rules
 
-ROWS = f"""SELECT {", ".join(f"r.{name}" for name in Record._fields if name not in {"machine_id", "characteristic_id", "received_at", "paused_by", "alarms"})},
+ROWS = f"""SELECT {", ".join(f"r.{name}" for name in Record.__struct_fields__ if name not in {"machine_id", "characteristic_id", "received_at", "paused_by", "alarms"})},
     r.paused_by IS NULL, cardinality(r.alarms), c.amount, c.status, c.applied_by ~ '^reading'
     FROM reading r JOIN characteristic h ON h.id = r.characteristic_id AND h.machine_id = r.machine_id
     LEFT JOIN correction c ON c.machine_id = r.machine_id AND c.number = r.correction
