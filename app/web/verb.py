@@ -1,11 +1,11 @@
 """A verb: something a person does to one thing, declared once.
 
-A room declares its verbs. Each is drawn as a dialog, a page and a station (`Verb.question`, `carry_out`) and as a JSON route
-(`draw`); the button, the sentence afterwards and the form follow from the declaration. The savepoint, "somebody was first"
+A room declares its verbs. Each is drawn as a page that asks and does (`draw_question`), as a dialog and at a station
+(`Verb.question`, `carry_out`) and as a JSON route (`draw`); the button, the sentence afterwards and the form follow from the declaration. The savepoint, "somebody was first"
 and "sent twice" are here and nowhere else.
 """
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Annotated, Any, Generic, Literal, NamedTuple, Protocol, TypeVar
 
@@ -13,9 +13,10 @@ from fastapi import APIRouter, Depends, Request, Response
 from pydantic import BaseModel
 from sqlalchemy.orm import Session
 
-from app.errors import Conflict, InbandError, NotFound
+from app.errors import Conflict, InbandError, Invalid, NotFound
 from app.language.i18n import _
 from app.web.api import problems
+from app.web.deps import FormDep
 from app.web.forms import by_field, typed
 from app.web.templates import page
 
@@ -189,6 +190,51 @@ def ask(
     """The page of a question. form, error: what was sent, and why it is refused."""
     asked: dict[str, Any] = {"question": question, "form": form or {}, "errors": by_field(error) if error else {}}
     return page(request, template, status=error.status if error else 200, **asked, **context)
+
+
+def draw_question(
+    router: APIRouter,
+    path: str,
+    verbs: Sequence[Verb[On, Any]],
+    subject: Any,
+    *,
+    around: Callable[[On, Verb[On, Any]], Mapping[str, Any]],
+    after: Callable[[Request, On, Verb[On, Any], Outcome], Response],
+    astray: Callable[[], str],
+    reads: Callable[[Mapping[str, str]], Mapping[str, str]] = lambda form: form,
+    template: str = "tools/ask.html",
+) -> None:
+    """Add the page that asks, and that does what its form says. With several verbs the path names one as ``{what}``.
+
+    subject: the dependency that finds the thing for a caller of the role; around: what the template shows around the question;
+    after: the answer to what was done, or came too late; astray: where to go if there is no such verb; reads: the form's fields
+    as those of the body, where they differ.
+    """
+
+    def asked(request: Request, on: On) -> Verb[On, Any]:
+        return named(verbs, request.path_params.get("what", verbs[0].name), on, astray())
+
+    def shown(
+        request: Request, on: On, form: Mapping[str, str] | None = None, error: InbandError | None = None
+    ) -> Response:
+        verb = asked(request, on)
+        question = verb.question(on, path.format(**request.path_params))
+        return ask(request, template, question, form, error, **around(on, verb))
+
+    def question(request: Request, on: Any) -> Response:
+        return shown(request, on)
+
+    def answer(request: Request, on: Any, form: FormDep) -> Response:
+        verb = asked(request, on)
+        try:
+            outcome = carry_out(verb, on, reads(form))
+        except Invalid as error:
+            return shown(request, on, form, error)
+        return after(request, on, verb, outcome)
+
+    question.__annotations__["on"] = answer.__annotations__["on"] = Annotated[Any, Depends(subject)]
+    router.get(path)(question)
+    router.post(path)(answer)
 
 
 def draw(

@@ -1,6 +1,5 @@
 """Pages: machines with rotary axes, one of them with its drift and back-ups, a run, two runs in one picture, the protocol."""
 
-from collections.abc import Mapping
 from datetime import UTC, datetime
 from functools import partial
 from typing import Annotated, Any
@@ -25,7 +24,7 @@ from app.web.deps import FormDep, Number, SessionDep, Word
 from app.web.fields import LARGEST_ID
 from app.web.paging import address, part_of
 from app.web.templates import page
-from app.web.verb import Verb, ask, carry_out, named
+from app.web.verb import Outcome, Verb, draw_question
 
 router = APIRouter(include_in_schema=False)
 
@@ -152,71 +151,64 @@ def recompute(request: Request, session: SessionDep, caller: Operator, run: int)
 # --- the second touch
 
 
-def _verb(what: str, on: OfRun) -> Verb[OfRun, Any]:
-    return named(verbs.RUN, what, on, _("Go back to the rotary axes."))
+def _run(session: SessionDep, caller: Operator, run: int) -> OfRun:
+    return OfRun(session, run, caller)
 
 
-@router.get("/kinematics/runs/{run}/{what}")
-def ask_first(request: Request, session: SessionDep, caller: Operator, run: int, what: str) -> Response:
-    """The second touch: `confirm` a large change, or it is to `enter`."""
-    on = OfRun(session, run, caller)
-    return _ask_run(request, _verb(what, on), on)
-
-
-def _ask_run(
-    request: Request,
-    verb: Verb[OfRun, Any],
-    on: OfRun,
-    form: Mapping[str, str] | None = None,
-    error: Invalid | None = None,
-) -> Response:
-    back, row = f"/kinematics/runs/{on.number}", on.row
-    question, entered = verb.question(on, f"{back}/{verb.name}"), verb.name == "enter"
+def _around_run(on: OfRun, verb: Verb[OfRun, Any]) -> dict[str, Any]:
+    row, entered = on.row, verb.name == "enter"
     offsets = entered and bool(errors_of(row.run.results)) and any((row.run.results["offsets"] or {}).values())
-    more = {"machine": row.machine, "back": back, "offsets": offsets, "when": entered}
-    return ask(request, "rotary_axes/ask.html", question, form, error, **more, **COMMON)
+    return {
+        "machine": row.machine,
+        "back": f"/kinematics/runs/{on.number}",
+        "offsets": offsets,
+        "when": entered,
+        **COMMON,
+    }
 
 
-@router.post("/kinematics/runs/{run}/{what}")
-def decide(request: Request, session: SessionDep, caller: Operator, run: int, what: str, form: FormDep) -> Response:
-    """It is done, or who comes too late sees the state now."""
-    on = OfRun(session, run, caller)
-    verb = _verb(what, on)
-    try:
-        outcome = carry_out(verb, on, form_reader.entry(form))
-    except Invalid as error:
-        return _ask_run(request, verb, on, form, error)
+def _after_run(request: Request, on: OfRun, verb: Verb[OfRun, Any], outcome: Outcome) -> Response:
+    """Anyone who comes too late sees the state now."""
     if outcome.kind == "late":
-        return shown_run(request, session, caller, run, message=outcome.refused, late=True)
-    return RedirectResponse(f"/kinematics/runs/{run}?done={what}", 303)
+        return shown_run(request, on.session, on.caller, on.number, message=outcome.refused, late=True)
+    return RedirectResponse(f"/kinematics/runs/{on.number}?done={verb.name}", 303)
 
 
-@router.get("/kinematics/machines/{machine}/backups/{version}")
-def ask_restore(request: Request, session: SessionDep, caller: Engineer, machine: str, version: int) -> Response:
-    """The second touch before a kinematics is put back."""
-    return _ask_restore(request, OfBackup(session, machine_named(session, machine), version, caller))
+draw_question(
+    router,
+    "/kinematics/runs/{run}/{what}",
+    verbs.RUN,
+    _run,
+    around=_around_run,
+    after=_after_run,
+    astray=lambda: _("Go back to the rotary axes."),
+    reads=form_reader.entry,
+    template="rotary_axes/ask.html",
+)
 
 
-def _ask_restore(
-    request: Request, on: OfBackup, form: Mapping[str, str] | None = None, error: Invalid | None = None
-) -> Response:
-    back = machine_url(on.machine.key)
-    question = verbs.RESTORE.question(on, f"{back}/backups/{on.number}")
-    more = {"machine": on.machine, "back": back, "offsets": False, "when": False}
-    return ask(request, "rotary_axes/ask.html", question, form, error, **more, **COMMON)
+def _backup(session: SessionDep, caller: Engineer, machine: str, version: int) -> OfBackup:
+    return OfBackup(session, machine_named(session, machine), version, caller)
 
 
-@router.post("/kinematics/machines/{machine}/backups/{version}")
-def restore(
-    request: Request, session: SessionDep, caller: Engineer, machine: str, version: int, form: FormDep
-) -> Response:
-    """It is put back, as a new version."""
-    on = OfBackup(session, machine_named(session, machine), version, caller)
-    try:
-        outcome = carry_out(verbs.RESTORE, on, {**form, "instead_of": form.get("seen", "")})
-    except Invalid as error:
-        return _ask_restore(request, on, form, error)
+def _around_backup(on: OfBackup, _verb: Verb[OfBackup, Any]) -> dict[str, Any]:
+    return {"machine": on.machine, "back": machine_url(on.machine.key), "offsets": False, "when": False, **COMMON}
+
+
+def _after_restore(request: Request, on: OfBackup, _verb: Verb[OfBackup, Any], outcome: Outcome) -> Response:
     if outcome.kind == "late":
-        return shown_machine(request, session, caller, machine, message=outcome.refused, late=True)
+        return shown_machine(request, on.session, on.caller, on.machine.key, message=outcome.refused, late=True)
     backup = outcome.result
     return RedirectResponse(machine_url(on.machine.key, head=backup.head, done="restore", n=backup.version), 303)
+
+
+draw_question(
+    router,
+    "/kinematics/machines/{machine}/backups/{version}",
+    (verbs.RESTORE,),
+    _backup,
+    around=_around_backup,
+    after=_after_restore,
+    astray=lambda: _("Go back to the rotary axes."),
+    template="rotary_axes/ask.html",
+)

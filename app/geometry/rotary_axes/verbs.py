@@ -150,7 +150,7 @@ def _restoring(on: OfBackup) -> list[str]:
 def _version_now(on: OfBackup) -> dict[str, str]:
     """The version in effect, so that another one is not replaced unseen."""
     old = queries.backup(on.session, on.machine, on.number)
-    return {"seen": str(queries.version_of(on.session, on.machine.id, old.head))}
+    return {"instead_of": str(queries.version_of(on.session, on.machine.id, old.head))}
 
 
 RESTORE: Verb[OfBackup, RestoreIn] = Verb(

@@ -25,7 +25,7 @@ from app.web import paging
 from app.web.deps import FormDep, Number, SessionDep, Sought, Word
 from app.web.forms import typed
 from app.web.templates import page
-from app.web.verb import Verb, ask, carry_out, named
+from app.web.verb import Outcome, Verb, draw_question
 
 router = APIRouter(include_in_schema=False)
 ON_PAGE = 25
@@ -213,59 +213,30 @@ def _add_pairs(session: Session, machine: Any, location: int, given: list[PairIn
         raise Invalid(missing.detail, errors=[FieldError("lines", missing.detail)]) from None
 
 
-@router.get("/calibration/{machine}/{memory}/{location}/{what}/{number}")
-def ask_first(
-    request: Request,
-    session: SessionDep,
-    caller: Operator,
-    machine: str,
-    memory: str,
-    location: int,
-    what: str,
-    number: int,
-) -> Response:
-    """The second touch: `accept` a calibration, accept the `suggestion` of the pairs, `exclude` a pair."""
-    on = OfPlace(session, machine_named(session, machine), _of(memory, location), number, caller)
-    return _ask(request, _verb(what, on), on)
+def _place_of(session: SessionDep, caller: Operator, machine: str, memory: str, location: int, number: int) -> OfPlace:
+    return OfPlace(session, machine_named(session, machine), _of(memory, location), number, caller)
 
 
-def _verb(what: str, on: OfPlace) -> Verb[OfPlace, Any]:
-    return named(verbs.PLACE, what, on, wording.go_to_overview())
-
-
-def _ask(
-    request: Request,
-    verb: Verb[OfPlace, Any],
-    on: OfPlace,
-    form: Mapping[str, str] | None = None,
-    error: Invalid | None = None,
-) -> Response:
+def _around(on: OfPlace, _verb: Verb[OfPlace, Any]) -> dict[str, Any]:
     here = address(on.machine.key, on.place)
-    question = verb.question(on, f"{here}/{verb.name}/{on.number}")
-    trail = [(_("Calibration"), "/calibration"), (f"{on.machine.name}, {question.where}", here)]
-    return ask(request, "tools/ask.html", question, form, error, machine=on.machine, trail=trail, back=here)
+    trail = [(_("Calibration"), "/calibration"), (f"{on.machine.name}, {wording.place_words(on.place)}", here)]
+    return {"machine": on.machine, "trail": trail, "back": here}
 
 
-@router.post("/calibration/{machine}/{memory}/{location}/{what}/{number}")
-def confirm(
-    request: Request,
-    session: SessionDep,
-    caller: Operator,
-    machine: str,
-    memory: str,
-    location: int,
-    what: str,
-    number: int,
-    form: FormDep,
-) -> Response:
-    """It is done, or who comes too late sees the state now."""
-    on = OfPlace(session, machine_named(session, machine), _of(memory, location), number, caller)
-    verb = _verb(what, on)
-    try:
-        outcome = carry_out(verb, on, {**form, "empirical_value": form.get("seen", "")})
-    except Invalid as error:
-        return _ask(request, verb, on, form, error)
+def _after(request: Request, on: OfPlace, verb: Verb[OfPlace, Any], outcome: Outcome) -> Response:
+    """Anyone who comes too late sees the state now."""
     if outcome.kind == "late":
-        return _place(request, session, caller, machine, on.place, said=outcome.refused, late=True)
-    n = outcome.result.record.number if verb is verbs.SUGGESTION else number
-    return RedirectResponse(address(machine, on.place, done=what, n=n), 303)
+        return _place(request, on.session, on.caller, on.machine.key, on.place, said=outcome.refused, late=True)
+    n = outcome.result.record.number if verb is verbs.SUGGESTION else on.number
+    return RedirectResponse(address(on.machine.key, on.place, done=verb.name, n=n), 303)
+
+
+draw_question(
+    router,
+    "/calibration/{machine}/{memory}/{location}/{what}/{number}",
+    verbs.PLACE,
+    _place_of,
+    around=_around,
+    after=_after,
+    astray=wording.go_to_overview,
+)

@@ -69,7 +69,7 @@ def _suggesting(on: OfPlace) -> list[str]:
 def _suggested(on: OfPlace) -> dict[str, str]:
     """The suggestion on the page, so that another one is not accepted unseen."""
     suggested = queries.suggestion(on.session, on.machine, on.place.location).comparison.suggested
-    return {} if suggested is None else {"seen": f"{suggested:.9f}"}
+    return {} if suggested is None else {"empirical_value": f"{suggested:.9f}"}
 
 
 def _sets(place: Place, before: float, after: float | None) -> list[str]:

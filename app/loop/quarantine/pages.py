@@ -8,7 +8,7 @@ from fastapi import APIRouter, Query, Request, Response
 from sqlalchemy.orm import Session
 from starlette.responses import RedirectResponse
 
-from app.access.deps import Caller, Operator, Viewer, require
+from app.access.deps import Operator, Viewer, require
 from app.errors import Conflict, InbandError, Invalid
 from app.language.i18n import _
 from app.loop.alarm_response import wording as alarm_words
@@ -22,7 +22,7 @@ from app.web.deps import Before, FormDep, Number, SessionDep, Word
 from app.web.forms import by_field, typed
 from app.web.paging import address, part_of
 from app.web.templates import page
-from app.web.verb import Verb, ask, carry_out, named, said
+from app.web.verb import Outcome, Verb, draw_question, said
 
 router = APIRouter(include_in_schema=False)
 ON_PAGE = 50
@@ -127,40 +127,28 @@ def quarantine_page(
     )
 
 
-def _verb_of(session: Session, caller: Caller, number: int, part: int, what: str) -> tuple[Verb[OfPart, Any], OfPart]:
-    on = OfPart(session, number, part, caller)
-    return named(verbs.PART, what, on, _("Go back to the quarantine.")), on
+def _part(session: SessionDep, caller: Operator, number: int, part: int) -> OfPart:
+    return OfPart(session, number, part, caller)
 
 
-@router.get("/quarantines/{number}/parts/{part}/{what}")
-def ask_part(request: Request, session: SessionDep, caller: Operator, number: int, part: int, what: str) -> Response:
-    """The question before a part is measured again, released or scrapped."""
-    return _ask(request, *_verb_of(session, caller, number, part, what))
-
-
-def _ask(
-    request: Request,
-    verb: Verb[OfPart, Any],
-    on: OfPart,
-    form: Mapping[str, str] | None = None,
-    error: Invalid | None = None,
-) -> Response:
+def _around(on: OfPart, _verb: Verb[OfPart, Any]) -> dict[str, Any]:
     back = f"/quarantines/{on.quarantine}"
-    question = verb.question(on, f"{back}/parts/{on.number}/{verb.name}")
     trail = [(_("Quarantines"), "/quarantines"), (_("Quarantine {number}").format(number=on.quarantine), back)]
-    machine = queries.quarantine(on.session, on.quarantine).machine
-    return ask(request, "tools/ask.html", question, form, error, machine=machine, trail=trail, back=back)
+    return {"machine": queries.quarantine(on.session, on.quarantine).machine, "trail": trail, "back": back}
 
 
-@router.post("/quarantines/{number}/parts/{part}/{what}")
-def decide_part(
-    request: Request, session: SessionDep, caller: Operator, number: int, part: int, what: str, form: FormDep
-) -> Response:
-    """Decide about a part. Sent twice, or after somebody else, it changes nothing and says so."""
-    verb, on = _verb_of(session, caller, number, part, what)
-    try:
-        outcome = carry_out(verb, on, form)
-    except Invalid as error:
-        return _ask(request, verb, on, form, error)
-    told = {"late": part} if outcome.kind == "late" else {"done": verb.name, "n": part}
-    return RedirectResponse(address(f"/quarantines/{number}", **told) + f"#part-{part}", 303)
+def _decided(_request: Request, on: OfPart, verb: Verb[OfPart, Any], outcome: Outcome) -> Response:
+    """Sent twice, or after somebody else, it changes nothing and says so."""
+    told = {"late": on.number} if outcome.kind == "late" else {"done": verb.name, "n": on.number}
+    return RedirectResponse(address(f"/quarantines/{on.quarantine}", **told) + f"#part-{on.number}", 303)
+
+
+draw_question(
+    router,
+    "/quarantines/{number}/parts/{part}/{what}",
+    verbs.PART,
+    _part,
+    around=_around,
+    after=_decided,
+    astray=lambda: _("Go back to the quarantine."),
+)

@@ -21,7 +21,7 @@ from app.web.deps import FormDep, Number, SessionDep, Word
 from app.web.forms import by_field
 from app.web.paging import address, part_of
 from app.web.templates import page
-from app.web.verb import Verb, ask, carry_out, named
+from app.web.verb import Outcome, carry_out, draw_question, named
 
 router = APIRouter(include_in_schema=False)
 MOST_IN_QUEUE = 50
@@ -138,7 +138,7 @@ def decide(
     """Approve, release, reject, or confirm that it was applied. Somebody who comes too late sees the state now."""
     on = OfCorrection(session, machine_named(session, machine), number, caller)
     tool, came_from = on.row.correction.tool_memory, form.get("from")
-    verb = named(verbs.CORRECTION, form.get("do", ""), on, _("Go back to the tool memory."))
+    verb = named(verbs.CORRECTION, form.get("do", ""), on, _astray())
     try:
         outcome = carry_out(verb, on, form)
     except Invalid as error:
@@ -151,61 +151,39 @@ def decide(
     return RedirectResponse(memory_address(machine, tool=tool, **said), 303)
 
 
-def _of_tool(
-    session: Session, machine: str, number: int, caller: Caller, what: str
-) -> tuple[Verb[OfTool, Any], OfTool]:
-    on = OfTool(session, machine_named(session, machine), number, caller)
-    return named(verbs.TOOL, what, on, _("Go back to the tool memory.")), on
+def _tool(session: SessionDep, caller: Operator, machine: str, number: int) -> OfTool:
+    return OfTool(session, machine_named(session, machine), number, caller)
 
 
-@router.get("/machines/{machine}/tools/{number}/{what}")
-def ask_tool(request: Request, session: SessionDep, caller: Operator, machine: str, number: int, what: str) -> Response:
-    """The forms of a manual edit (`edit`), of a tool change (`change`) and of going on with the sister tool (`sister`)."""
-    return _ask(request, *_of_tool(session, machine, number, caller, what))
+def _average(session: SessionDep, caller: Operator, machine: str, location: int) -> OfAverage:
+    return OfAverage(session, machine_named(session, machine), location, caller)
 
 
-@router.post("/machines/{machine}/tools/{number}/{what}")
-def set_tool(
-    request: Request, session: SessionDep, caller: Operator, machine: str, number: int, what: str, form: FormDep
-) -> Response:
-    """The offset was set by hand, the tool was changed, or its sister goes on."""
-    return _do(request, *_of_tool(session, machine, number, caller, what), form)
+def _around(on: OfTool | OfAverage, _verb: Any) -> dict[str, Any]:
+    machine, memory = on.machine, memory_address(on.machine.key)
+    trail = [(_("Machines"), "/machines"), (machine.name, f"/machines/{machine.key}"), (_("Tool memory"), memory)]
+    return {"machine": machine, "trail": trail, "back": memory}
 
 
-@router.get("/machines/{machine}/averages/{location}/edit")
-def ask_empirical_value(
-    request: Request, session: SessionDep, caller: Operator, machine: str, location: int
-) -> Response:
-    """The form of an empirical value."""
-    return _ask(request, verbs.AVERAGE[0], OfAverage(session, machine_named(session, machine), location, caller))
-
-
-@router.post("/machines/{machine}/averages/{location}/edit")
-def set_empirical_value(
-    request: Request, session: SessionDep, caller: Operator, machine: str, location: int, form: FormDep
-) -> Response:
-    """Set the empirical value of an average memory."""
-    return _do(request, verbs.AVERAGE[0], OfAverage(session, machine_named(session, machine), location, caller), form)
-
-
-def _do(request: Request, verb: Verb[Any, Any], on: OfTool | OfAverage, form: Mapping[str, str]) -> Response:
-    try:
-        said = carry_out(verb, on, form).said
-    except Invalid as error:
-        return _ask(request, verb, on, form, error)
+def _after(_request: Request, on: OfTool | OfAverage, _verb: Any, outcome: Outcome) -> Response:
+    said = outcome.said
     tool = said.number if isinstance(on, OfTool) else None
     return RedirectResponse(memory_address(on.machine.key, tool=tool, done=said.code, n=said.number), 303)
 
 
-def _ask(
-    request: Request,
-    verb: Verb[Any, Any],
-    on: OfTool | OfAverage,
-    form: Mapping[str, str] | None = None,
-    error: Invalid | None = None,
-) -> Response:
-    machine, memory = on.machine, memory_address(on.machine.key)
-    where = f"tools/{on.number}/{verb.name}" if isinstance(on, OfTool) else f"averages/{on.number}/edit"
-    question = verb.question(on, f"/machines/{machine.key}/{where}")
-    trail = [(_("Machines"), "/machines"), (machine.name, f"/machines/{machine.key}"), (_("Tool memory"), memory)]
-    return ask(request, "tools/ask.html", question, form, error, machine=machine, trail=trail, back=memory)
+def _astray() -> str:
+    return _("Go back to the tool memory.")
+
+
+draw_question(
+    router, "/machines/{machine}/tools/{number}/{what}", verbs.TOOL, _tool, around=_around, after=_after, astray=_astray
+)
+draw_question(
+    router,
+    "/machines/{machine}/averages/{location}/edit",
+    verbs.AVERAGE,
+    _average,
+    around=_around,
+    after=_after,
+    astray=_astray,
+)

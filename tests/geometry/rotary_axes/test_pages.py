@@ -175,9 +175,9 @@ class TestDeciding:
         place = f"{machine(shop)}/backups/1"
         assert "EX0C: +0.0123 mm becomes +0.0000 mm" in words(engineer.open(place))
         operator.open(place, 403)
-        late = engineer.send(place, 409, reason="x", seen="1")
+        late = engineer.send(place, 409, reason="x", instead_of="1")
         assert "in effect" in late
-        assert "it is version 3 now" in engineer.send(place, reason="Worse than before", seen="2")
+        assert "it is version 3 now" in engineer.send(place, reason="Worse than before", instead_of="2")
         assert "version 1 put back" in engineer.open(machine(shop))
         assert "is in effect" in engineer.send(f"{machine(shop)}/backups/3", 409, reason="x")
         engineer.open(f"{machine(shop)}/backups/99", 404)

@@ -195,10 +195,10 @@ class TestWithoutScripts:
         assert "5 pairs are stored" in text
         assert "+2.6" in text
         asked = operator.open(f"{place(shop)}/suggestion/0")
-        assert 'name="seen" value="0.002600000"' in asked
-        late = operator.send(f"{place(shop)}/suggestion/0", 409, reason="Compared", seen="0.0025")
+        assert 'name="empirical_value" value="0.002600000"' in asked
+        late = operator.send(f"{place(shop)}/suggestion/0", 409, reason="Compared", empirical_value="0.0025")
         assert "another one by now" in late
-        operator.send(f"{place(shop)}/suggestion/0", reason="Compared with a micrometer", seen="0.002600000")
+        operator.send(f"{place(shop)}/suggestion/0", reason="Compared with a micrometer", empirical_value="0.002600000")
         assert shop.call("GET", f"/machines/{shop.machine}/averages/5")["empirical_value"] == 0.0026
 
     def test_pairs_name_readings_and_one_is_excluded(self, shop: Shop, operator: Person) -> None:
