@@ -190,10 +190,7 @@ def import_file(
         given = {"mapping": mapping, "characteristic": characteristic, "create_missing": create_missing}
         _import_aqdef(file, chosen, data_dir, database_url, machine=machine, dry_run=dry_run, **given)
         return
-    if characteristic and columns:
-        raise typer.BadParameter(
-            _("Name one characteristic, or the columns of several."), param_hint="--characteristic"
-        )
+    _one_or_several(not (characteristic and columns))
     if live and not characteristic:
         raise typer.BadParameter(_("A wide sheet is imported as history only."), param_hint="--live")
     wishes = replace(
@@ -210,10 +207,7 @@ def import_file(
         _bar(file) as bar,
     ):
         layout = look(path, wishes, file.name, complete=bool(characteristic))
-        if not (characteristic or columns or layout.names):
-            raise typer.BadParameter(
-                _("Name one characteristic, or the columns of several."), param_hint="--characteristic"
-            )
+        _one_or_several(bool(characteristic or columns or layout.names))
         if layout.names:
             refuse_incomplete(layout)
         _tell(layout, wide=not characteristic)
@@ -234,6 +228,13 @@ def import_file(
         _sum_up_all(results, live=live, dry_run=dry_run)
     if any(result.trouble is not None for result in results):
         raise typer.Exit(1)
+
+
+def _one_or_several(said: bool) -> None:
+    if not said:
+        raise typer.BadParameter(
+            _("Name one characteristic, or the columns of several."), param_hint="--characteristic"
+        )
 
 
 def _with_missing(

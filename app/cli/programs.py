@@ -5,13 +5,17 @@ import json
 import sys
 from enum import StrEnum
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from app.cli.base import DatabaseUrl, DataDir, cli, existing, say, settings_from
 from app.core.programs.correction_forms import Form
 from app.core.programs.ring_settings import Offsets
+
+if TYPE_CHECKING:
+    from app.core.programs.ring_settings import RingSettings
+    from app.loop.characteristics.queries import CurrentCharacteristic
 
 program = typer.Typer(help="Program text of the controls.", no_args_is_help=True)
 cli.add_typer(program, name="program")
@@ -170,16 +174,22 @@ def write_program(
                 decision_stops=decision_stops,
                 hold_stops=hold_stops,
             )
-            if folder is None:
-                sys.stdout.write(ring_queries.ring_text(current, ring_of, "all").text)
-                return
-            folder.mkdir(parents=True, exist_ok=True)
-            for text in ring_queries.ring_texts(current, ring_of):
-                (folder / text.file).write_text(text.text, encoding="ascii", newline="\r\n")
-                say(f"{folder / text.file}: {ring_queries.ring_word(text.key)}")
+            _write_ring(current, ring_of, folder)
             return
         chosen = programs.control_of(current, control.value if control else None)
         sys.stdout.write(programs.program_of(current, chosen, kind.value, gauge=gauge))
+
+
+def _write_ring(current: "CurrentCharacteristic", settings: "RingSettings", folder: Path | None) -> None:
+    from app.loop.programs import ring_queries
+
+    if folder is None:
+        sys.stdout.write(ring_queries.ring_text(current, settings, "all").text)
+        return
+    folder.mkdir(parents=True, exist_ok=True)
+    for text in ring_queries.ring_texts(current, settings):
+        (folder / text.file).write_text(text.text, encoding="ascii", newline="\r\n")
+        say(f"{folder / text.file}: {ring_queries.ring_word(text.key)}")
 
 
 @program.command("corrections")

@@ -127,14 +127,6 @@ def decide_reading(pending: PendingWrites, entry: Entry, reading: ReadingIn, now
     name_correction(alarms, stream, newest)
     alarms += [] if opposed is None else [opposed]
     correction = _issue(pending, stream, tool, sequence, decision) if tool and decision.amount is not None else None
-
-    _move_along(stream, sequence, decision, alarms)
-    if not late:
-        stream.last_measured_at = measured_at
-        if not jump:
-            remember(stream, sequence, decision, compensated)
-        if course is not None and not jump and decision.action is not Action.STOP:
-            stream.level, stream.level_sequence, stream.level_moved = moved(stream.level, course), sequence, True
     verdict = Verdict(
         stream=stream,
         reading=reading,
@@ -152,7 +144,7 @@ def decide_reading(pending: PendingWrites, entry: Entry, reading: ReadingIn, now
         compensated=compensated,
         results=results,
     )
-    stream.last = verdict
+    _move_along(verdict, course, jump=jump)
     pending.touched[entry.characteristic_id] = stream
     pending.verdicts.append(verdict)
     if reading.key is not None:
@@ -160,15 +152,28 @@ def decide_reading(pending: PendingWrites, entry: Entry, reading: ReadingIn, now
     return verdict
 
 
-def _move_along(stream: PendingStream, sequence: int, decision: Decision, alarms: Sequence[PendingAlarm]) -> None:
-    """Count the reading, keep the running average, and pause after a probe fault."""
-    stream.sequence = sequence
+def _move_along(verdict: Verdict, course: float | None, *, jump: bool) -> None:
+    """Count the reading, keep the running average, pause after a probe fault; one in time is what the next are compared with."""
+    stream, decision = verdict.stream, verdict.decision
+    stream.sequence, stream.last = verdict.sequence, verdict
     average = stream.average
     if average is not None and average.average != decision.average_after:
         average.average = decision.average_after
         average.changed = True
-    if decision.action is Action.STOP and stream.paused_by is None:
-        stream.paused_by = next(alarm for alarm in alarms if alarm.kind == ReadingAlarm.PROBE_FAULT.value)
+    stops = decision.action is Action.STOP
+    if stops and stream.paused_by is None:
+        stream.paused_by = next(alarm for alarm in verdict.alarms if alarm.kind == ReadingAlarm.PROBE_FAULT.value)
+    if verdict.late:
+        return
+    stream.last_measured_at = verdict.measured_at
+    if not jump:
+        remember(stream, verdict.sequence, decision, verdict.compensated)
+        if course is not None and not stops:
+            stream.level, stream.level_sequence, stream.level_moved = (
+                moved(stream.level, course),
+                verdict.sequence,
+                True,
+            )
 
 
 def _refuse_unissued(pending: PendingWrites, entry: Entry, in_effect: int | None) -> None:

@@ -12,7 +12,7 @@ from msgspec import structs
 from app.db.pipeline import Pipeline, Step
 from app.loop.readings.records import Entry, Record
 from app.loop.readings.writer.binary_copy import array_of_int4
-from app.loop.readings.writer.pending import PendingStream, PendingTool, PendingWrites, alarm_number
+from app.loop.readings.writer.pending import PendingStream, PendingTool, PendingWrites, Verdict, alarm_number
 from app.loop.readings.writer.statements import (
     ACTIVE_ALARMS,
     ALARM_NUMBERS,
@@ -134,12 +134,14 @@ async def _copy(pipeline: Pipeline, records: list[Record]) -> None:
             await copy.write_row(structs.astuple(structs.replace(record, outstanding=outstanding)))
 
 
+def _place(stream: PendingStream) -> dict[str, Any]:
+    return {"machine_id": stream.entry.machine_id, "characteristic_id": stream.entry.characteristic_id}
+
+
 def _stream_row(stream: PendingStream) -> dict[str, Any]:
     last = stream.last
     assert last is not None
-    return {
-        "machine_id": stream.entry.machine_id,
-        "characteristic_id": stream.entry.characteristic_id,
+    return _place(stream) | {
         "sequence": stream.sequence,
         "paused_by": alarm_number(stream.paused_by),
         "last_measured_at": stream.last_measured_at,
@@ -152,88 +154,44 @@ def _stream_row(stream: PendingStream) -> dict[str, Any]:
 
 
 def _rarer(pending: PendingWrites) -> Iterable[tuple[str, list[Any]]]:
-    yield (
-        TOUCHES,
-        [
-            {
-                "machine_id": v.stream.entry.machine_id,
-                "characteristic_id": v.stream.entry.characteristic_id,
-                "sequence": v.sequence,
-                "touches": v.reading.touches,
-            }
-            for v in pending.verdicts
-            if v.reading.touches is not None
-        ],
-    )
-    yield (
-        CONTEXT,
-        [
-            {
-                "machine_id": v.stream.entry.machine_id,
-                "characteristic_id": v.stream.entry.characteristic_id,
-                "sequence": v.sequence,
-                "context": v.reading.context,
-            }
-            for v in pending.verdicts
-            if v.reading.context is not None
-        ],
-    )
-    yield (
-        RESULTS,
-        [
-            {
-                "machine_id": v.stream.entry.machine_id,
-                "characteristic_id": v.stream.entry.characteristic_id,
-                "sequence": v.sequence,
-                **v.results._asdict(),
-            }
-            for v in pending.verdicts
-            if v.results is not None
-        ],
-    )
-    yield (
-        MOVE_LEVELS,
-        [
-            {
-                "machine_id": stream.entry.machine_id,
-                "characteristic_id": stream.entry.characteristic_id,
-                "level": stream.level,
-                "level_sequence": stream.level_sequence,
-            }
-            for stream in {id(v.stream): v.stream for v in pending.verdicts if v.stream.level_moved}.values()
-        ],
-    )
+    """The statements that few transactions need, each with its rows."""
+    yield from _beside_readings(pending.verdicts)
     if pending.touched_machines:
-        yield (
-            COUNTERS,
-            [{"machine_id": m, "last_correction": pending.last_number(m)} for m in pending.touched_machines],
-        )
-        tools = _tools(pending)
-        for tool in tools:
-            tool.give_reasons()
-        yield ISSUE, [c for tool in tools for c in tool.written() if c.new]
-        yield (
-            CHANGE_CORRECTIONS,
-            [c for tool in tools for c in tool.written() if not c.new],
-        )
-        yield (
-            MOVE_TOOLS,
-            [
-                {
-                    "machine_id": t.machine_id,
-                    "number": t.number,
-                    "offset": t.offset,
-                    "total": t.total,
-                    "paused_by": alarm_number(t.paused_by),
-                }
-                for t in tools
-                if t.changed
-            ],
-        )
-        yield STEPS, pending.offset_changes
+        yield from _of_tools(pending)
     if pending.raised:
         yield RAISE, [alarm for alarm in pending.raised if alarm.new]
         yield REPEAT, [alarm for alarm in pending.raised if not alarm.new]
+
+
+def _beside_readings(verdicts: list[Verdict]) -> Iterable[tuple[str, list[Any]]]:
+    def at(verdict: Verdict) -> dict[str, Any]:
+        return _place(verdict.stream) | {"sequence": verdict.sequence}
+
+    yield TOUCHES, [at(v) | {"touches": v.reading.touches} for v in verdicts if v.reading.touches is not None]
+    yield CONTEXT, [at(v) | {"context": v.reading.context} for v in verdicts if v.reading.context is not None]
+    yield RESULTS, [at(v) | v.results._asdict() for v in verdicts if v.results is not None]
+    moved = {id(v.stream): v.stream for v in verdicts if v.stream.level_moved}.values()
+    yield MOVE_LEVELS, [_place(s) | {"level": s.level, "level_sequence": s.level_sequence} for s in moved]
+
+
+def _of_tools(pending: PendingWrites) -> Iterable[tuple[str, list[Any]]]:
+    yield COUNTERS, [{"machine_id": m, "last_correction": pending.last_number(m)} for m in pending.touched_machines]
+    tools = _tools(pending)
+    for tool in tools:
+        tool.give_reasons()
+    written = [correction for tool in tools for correction in tool.written()]
+    yield ISSUE, [correction for correction in written if correction.new]
+    yield CHANGE_CORRECTIONS, [correction for correction in written if not correction.new]
+    names = ("machine_id", "number", "offset", "total")
+    yield (
+        MOVE_TOOLS,
+        [
+            {**{name: getattr(t, name) for name in names}, "paused_by": alarm_number(t.paused_by)}
+            for t in tools
+            if t.changed
+        ],
+    )
+    yield STEPS, pending.offset_changes
 
 
 def _tools(pending: PendingWrites) -> list[PendingTool]:
