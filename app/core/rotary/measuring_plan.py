@@ -196,15 +196,15 @@ def plan_of(cycle: Literal[451, 452], values: dict[str, QValue]) -> MeasuringPla
     )
     feed, clearance = values.get("Q253", 0.0), values.get("Q320", 0.0)
     return MeasuringPlan(
-        cycle,
-        number("Q407"),
-        axes,
-        "PREDEF" if isinstance(clearance, str) else clearance,
-        number("Q408"),
-        feed,  # type: ignore[arg-type]
-        number("Q380"),
-        int(number("Q423")),
-        number("Q432"),
-        int(number("Q406")),
-        int(number("Q431")),
+        cycle=cycle,
+        ball_radius=number("Q407"),
+        axes=axes,
+        clearance="PREDEF" if isinstance(clearance, str) else clearance,
+        retract_height=number("Q408"),
+        feed=feed,  # type: ignore[arg-type]
+        reference_angle=number("Q380"),
+        touches=int(number("Q423")),
+        backlash_angle=number("Q432"),
+        mode=int(number("Q406")),
+        preset=int(number("Q431")),
     )

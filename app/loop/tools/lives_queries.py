@@ -70,15 +70,15 @@ def lives(session: Session, machine: Machine, number: int, *, limit: int = MOST_
     all_lives = [Life(0, tool.changed_at, None, parts, tool.total, tool.edge, tool.name)]
     all_lives += [
         Life(
-            back,
-            since,
-            change.at,
-            change.parts or 0,
-            change.total,
-            change.edge,
-            change.name,
-            change.actor,
-            change.reason,
+            number=back,
+            began_at=since,
+            ended_at=change.at,
+            parts=change.parts or 0,
+            total=change.total,
+            edge=change.edge,
+            name=change.name,
+            actor=change.actor,
+            reason=change.reason,
         )
         for back, (change, since) in enumerate(zip(ended, began, strict=False), start=1)
     ]

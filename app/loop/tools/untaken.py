@@ -176,17 +176,17 @@ def _untaken(row: Row[Any]) -> Untaken:
     held_back: Sequence[dict[str, Any]] = () if row.hold_all else row.held_back or ()
     reason = next((each["reason"] for each in held_back if each["tool_memory"] == row.tool_memory), None)
     return Untaken(
-        row.machine_id,
-        row.key,
-        row.tool_memory,
-        int(row.waiting),
-        row.most,
-        row.first,
-        row.since,
-        row.measured,
-        reason,
-        row.hold_all is not None,
-        row.now,
+        machine_id=row.machine_id,
+        machine=row.key,
+        tool=row.tool_memory,
+        waiting=int(row.waiting),
+        most=row.most,
+        first=row.first,
+        since=row.since,
+        measured=row.measured,
+        reason=reason,
+        bridge=row.hold_all is not None,
+        now=row.now,
     )
 
 

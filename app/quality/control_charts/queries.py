@@ -190,19 +190,19 @@ def points_of(baseline: Baseline, made: ReadingSeries, window: Window) -> Charte
     chart = shewhart.means(judged_by(baseline), groups) if groups is not None and len(starts) else None
     until_end = series.sequence <= window.last
     return Charted(
-        baseline,
-        chart,
-        groups if len(starts) else None,
-        sequence[starts],
-        sequence[lasts],
-        at[lasts],
-        lasts - starts + 1,
-        begins,
-        series.only(until_end),
-        points_read.measured_at[until_end],
-        _through(made, window.last),
-        waiting,
-        settling,
+        baseline=baseline,
+        chart=chart,
+        groups=groups if len(starts) else None,
+        first=sequence[starts],
+        last=sequence[lasts],
+        measured_at=at[lasts],
+        sizes=lasts - starts + 1,
+        begins=begins,
+        series=series.only(until_end),
+        series_at=points_read.measured_at[until_end],
+        read=_through(made, window.last),
+        waiting=waiting,
+        settling=settling,
     )
 
 
@@ -221,17 +221,17 @@ def _singly(baseline: Baseline, series: ReadingSeries, shown: ReadingSeries, win
     values: Floats = shown.series.values[inside]
     chart = shewhart.individuals(judged_by(baseline), values) if len(values) else None
     return Charted(
-        baseline,
-        chart,
-        None,
-        sequence,
-        sequence,
-        at,
-        np.ones(len(values), np.int64),
-        shown.series.begins[inside],
-        shown.series,
-        shown.measured_at,
-        series,
-        0,
-        settling,
+        baseline=baseline,
+        chart=chart,
+        groups=None,
+        first=sequence,
+        last=sequence,
+        measured_at=at,
+        sizes=np.ones(len(values), np.int64),
+        begins=shown.series.begins[inside],
+        series=shown.series,
+        series_at=shown.measured_at,
+        read=series,
+        waiting=0,
+        settling=settling,
     )

@@ -105,8 +105,8 @@ def _cell(
     )
     if cell.figures is None:
         return CellView(
-            None, "", f"{named}: {wording.out_of_order(cell.zero_range, settings_map.averaging_limit)}", None,
-            False, False, False, today, chosen, "",
+            href=None, text="", title=f"{named}: {wording.out_of_order(cell.zero_range, settings_map.averaging_limit)}", level=None,
+            inside=False, best=False, calmest=False, today=today, chosen=chosen, edges="",
         )  # fmt: skip
     inside, best, calmest = (
         settings_map.region.inside[at],
@@ -132,7 +132,18 @@ def _cell(
     window = _("of {n} readings, {first} to {last}").format(n=cell.figures.inner, first=sequence[0], last=sequence[-1])
     title = f"{named}: {', '.join(lines)}, {window}" + (f" ({', '.join(marks)})" if marks else "")
     text = wording.cell(cell.figures, settings_map.criterion)
-    return CellView(href, text, title, level, inside, best, calmest, today, chosen, "")
+    return CellView(
+        href=href,
+        text=text,
+        title=title,
+        level=level,
+        inside=inside,
+        best=best,
+        calmest=calmest,
+        today=today,
+        chosen=chosen,
+        edges="",
+    )
 
 
 def _region(settings_map: Map) -> str:

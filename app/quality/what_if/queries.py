@@ -187,16 +187,16 @@ def side_by_side(session: Session, past: ToolHistory, settings: Settings) -> Sim
     other_result, other_figures = run(trace, past.policy(other, delay, settings.effect))
     truly = truly_of(session, past)
     return Simulation(
-        past,
-        settings,
-        delay,
-        truly,
-        _likeness(past, truly, past.carried(then), then_result),
-        past.carried(today_figures),
-        past.carried(other_figures),
-        today_result,
-        other_result,
-        other,
+        past=past,
+        settings=settings,
+        delay=delay,
+        truly=truly,
+        likeness=_likeness(past, truly, past.carried(then), then_result),
+        today=past.carried(today_figures),
+        other=past.carried(other_figures),
+        today_result=today_result,
+        other_result=other_result,
+        parameters=other,
     )
 
 
@@ -232,7 +232,15 @@ def map_of(
     ]
     region = best_region([cell.figures for cell in map_cells], criterion, of_today)
     return Map(
-        past, weighting_factors, zero_ranges, base.averaging_limit, delay, criterion, map_cells, of_today, region
+        past=past,
+        weighting_factors=weighting_factors,
+        zero_ranges=zero_ranges,
+        averaging_limit=base.averaging_limit,
+        delay=delay,
+        criterion=criterion,
+        cells=map_cells,
+        today=of_today,
+        region=region,
     )
 
 

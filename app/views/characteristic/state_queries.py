@@ -124,16 +124,16 @@ def plant(session: Session, *, machine: str | None = None, trends: bool = True) 
         )
         rows[characteristic.machine_id].append(
             CharacteristicRow(
-                characteristic,
-                parameters,
-                stream,
-                average,
-                offset,
-                alarms[number],
-                corrections[number],
-                known,
-                state_of(known),
-                rejects.get(number, NO_REJECTS) if parameters.accept_m > 1 else None,
+                characteristic=characteristic,
+                parameters=parameters,
+                stream=stream,
+                average=average,
+                offset=offset,
+                alarms=alarms[number],
+                corrections=corrections[number],
+                known=known,
+                state=state_of(known),
+                rejects=rejects.get(number, NO_REJECTS) if parameters.accept_m > 1 else None,
                 outlook=outlook,
                 tool_paused_by=tool_paused_by,
             )
