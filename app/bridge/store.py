@@ -37,7 +37,6 @@ from app.bridge.store_tables import (
 T = TypeVar("T")
 Job = tuple[Callable[[sqlite3.Connection], Any], Future[Any]]
 NOTE: Final = "INSERT INTO fact (machine, name, value) VALUES (?, ?, ?) ON CONFLICT (machine, name) DO UPDATE SET value = excluded.value"
-PAGE_ROWS: Final = 200
 GIVE_UP: Final = (
     "DELETE FROM reading WHERE id IN (SELECT id FROM reading WHERE state = 'sent' ORDER BY sent_at, id LIMIT ?)"
 )
