@@ -112,7 +112,7 @@ from app.views.help import pages as help_pages
 from app.views.licences import pages as licence_pages
 from app.views.overview import api as overview
 from app.views.overview import pages as overview_pages
-from app.views.plant import machine_pages
+from app.views.plant import machine_pages, trying_pages
 from app.views.plant import pages as plant_pages
 from app.views.reports import actions as report_actions
 from app.views.reports import api as reports
@@ -200,6 +200,7 @@ ROUTERS: tuple[APIRouter, ...] = (
     connection_pages.router,
     touch_test_pages.router,
     plant_pages.router,
+    trying_pages.router,
     station_pages.router,
     search_pages.router,
     to_do_pages.router,

@@ -4,7 +4,9 @@
     demo             the demonstration plant, which calls the public API as real machines do
     simulate.py      ``inband bridge simulate``
     demonstrate.py   ``inband demo``
+    trying.py        one lathe inside a plant that is empty otherwise
 
 A distribution of its own, inband-simulators: the pyproject.toml beside this file builds the folder as the part ``app.simulators`` of
-the Inband that is installed there. Nothing else in the house imports it; ``app.cli.simulators`` looks for it by name.
+the Inband that is installed there. Nothing else in the house imports it; ``app.cli.simulators`` and
+``app.views.plant.trying_pages`` look for it by name.
 """

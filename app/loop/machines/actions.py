@@ -20,10 +20,10 @@ __all__ = ["MachineChange", "MachineIn", "add_machine", "change_machine"]
 MAY_BE_NOTHING = {"corrections_expire_after", "signal_jitter"}
 
 
-def add_machine(session: Session, machine: MachineIn, actor: str) -> Machine:
+def add_machine(session: Session, machine: MachineIn, actor: str, *, simulated: bool = False) -> Machine:
     """Set up a machine with its empty tool memory (R10) and average memory (R11).
 
-    Raises `Conflict` for a key that is taken.
+    simulated: it makes its readings up, and can be removed (`app.loop.machines.simulated_actions`). Raises `Conflict` for a key that is taken.
     """
     if queries.key_is_taken(session, machine.key):
         raise Conflict(
@@ -31,7 +31,7 @@ def add_machine(session: Session, machine: MachineIn, actor: str) -> Machine:
             _("Choose another key, or change the machine that is there."),
             errors=[FieldError("key", _("is taken"))],
         )
-    created = Machine(**machine.model_dump())
+    created = Machine(**machine.model_dump(), simulated=simulated)
     session.add(created)
     session.flush()
     session.add(MachineState(machine_id=created.id))
@@ -79,6 +79,8 @@ def change_machine(session: Session, key: str, change: MachineChange, actor: str
             _("Change the name instead, or set up another machine."),
             errors=[FieldError("key", _("cannot be changed"))],
         )
+    if machine.simulated and change.name not in {None, machine.name}:
+        raise Invalid.at("name", _("The name of a simulated machine says that it is one, so it stays"))
     sent = change.model_dump(exclude={"key"}, exclude_unset=True)
     changes = {name: value for name, value in sent.items() if value is not None or name in MAY_BE_NOTHING}
     before = {name: getattr(machine, name) for name in changes}

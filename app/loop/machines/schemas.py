@@ -166,4 +166,7 @@ class MachineOut(BaseModel):
     zero_range_floor: Annotated[
         float, Field(description="What of it varies from point to point, mm; a smaller R33 is warned of.")
     ]
+    simulated: Annotated[
+        bool, Field(description="It is for trying and makes its readings up; it can be removed with all of them.")
+    ]
     created_at: datetime

@@ -42,6 +42,7 @@ class Machine(Base):
     plausible_shift: Mapped[float] = mapped_column(server_default="10")
     plausible_axis_turn: Mapped[float] = mapped_column(server_default="1")
     plausible_axis_shift: Mapped[float] = mapped_column(server_default="1")
+    simulated: Mapped[bool] = mapped_column(server_default="false")  # for trying; such a one can be removed again
 
     @property
     def position_uncertainty(self) -> float:

@@ -18,7 +18,8 @@ from app.views.characteristic.glance import band_picture, sparkline
 from app.views.characteristic.state_queries import CharacteristicRow, Group
 from app.views.characteristic.wording import state_word
 from app.views.plant.connections import connections_of
-from app.web.deps import SessionDep
+from app.views.plant.trying_pages import trying
+from app.web.deps import SessionDep, Word
 from app.web.templates import page
 
 router = APIRouter(include_in_schema=False, dependencies=[require("viewer")])
@@ -37,9 +38,9 @@ class MachineView(NamedTuple):
 
 
 @router.get("/")
-def plant_page(request: Request, session: SessionDep, show: Show = "all") -> Response:
+def plant_page(request: Request, session: SessionDep, show: Show = "all", done: Word = None) -> Response:
     """Every machine and characteristic."""
-    return _page(request, session, show, None)
+    return _page(request, session, show, None, done)
 
 
 @router.get("/machines/{machine}")
@@ -61,7 +62,7 @@ def summary(request: Request, session: SessionDep, show: Show = "all") -> Respon
     return page(request, "plant/summary.html", **_summary(groups), show=show)
 
 
-def _page(request: Request, session: Session, show: str, machine: str | None) -> Response:
+def _page(request: Request, session: Session, show: str, machine: str | None, done: str | None = None) -> Response:
     groups, now = queries.plant(session, machine=machine), datetime.now(UTC)
     if show == "all" and machine is None and sum(len(group.rows) for group in groups) > MOST:
         show = "short"
@@ -74,6 +75,8 @@ def _page(request: Request, session: Session, show: str, machine: str | None) ->
         connections=connections_of(session, groups[0].machine) if machine else [],
         machines=machines.machines(session) if machine else [],
         show=show,
+        done=done,
+        trying=trying(session, empty=not groups),
         state_word=state_word,
         band=lambda row: band_picture(row.stream.last_deviation, row.parameters, None, row.average),
         spark=lambda row: sparkline(row.trend, row.parameters),

@@ -5,7 +5,7 @@ from typing import Any
 
 import pytest
 from playwright.sync_api import Page, Route, expect
-from sqlalchemy import event
+from sqlalchemy import event, text
 
 from app.core.state import CharacteristicState
 from app.views.characteristic import state_queries as queries
@@ -192,12 +192,54 @@ class TestLive:
         expect(line(page, shop).get_by_text("In band")).to_be_hidden()
 
 
-def test_an_empty_plant_leads_to_set_up(run_server: RunServer) -> None:
+def of_machines(server: Server) -> dict[str, int]:
+    """Number of rows that belong to a machine, by table."""
+    with server.database.begin() as session:
+        tables = session.scalars(
+            text(
+                "SELECT table_name FROM information_schema.columns WHERE column_name = 'machine_id' AND table_schema = 'public'"
+            )
+        ).all()
+        counted = "SELECT count(*) FROM {} WHERE machine_id IS NOT NULL"
+        counts = {name: session.scalar(text(counted.format(name))) for name in tables}
+    return {name: count for name, count in counts.items() if count}
+
+
+def test_an_empty_plant_leads_to_set_up_or_to_a_simulated_machine_that_leaves_nothing_behind(
+    run_server: RunServer,
+) -> None:
     with run_server() as empty:
-        text = Person(empty, "viewer").open("/")
-    assert "No machine is set up yet" in text
-    assert "/setup/machines/new" in text
-    assert "inband demo --port" in text
+        engineer, viewer = Person(empty, "engineer"), Person(empty, "viewer")
+        page = engineer.open("/")
+        assert "No machine is set up yet" in page
+        assert "/setup/machines/new" in page
+        assert "Start a simulated lathe" in page
+        assert "Start a simulated lathe" not in viewer.open("/")
+        viewer.post("/simulated", 403)
+
+        engineer.post("/simulated")
+        assert "is simulated: nothing of it was measured" in viewer.open("/")
+        client = empty.client(empty.key())
+        [machine] = client.get("/api/v1/machines").json()["items"]
+        assert machine["simulated"]
+        until(lambda: client.get(f"/api/v1/machines/{machine['key']}/corrections").json()["items"], 120)
+        renamed = client.patch(f"/api/v1/machines/{machine['key']}", json={"name": "Lathe 1"})
+        assert "simulated" in renamed.json()["detail"]
+        measured = client.get("/api/v1/characteristics").json()["items"][0]["key"]
+
+        viewer.post("/simulated/remove", 403)
+        engineer.post("/simulated/remove")
+        assert of_machines(empty) == {}
+        assert "No machine is set up yet" in engineer.open("/?done=removed")
+        late = {"characteristic": measured, "measured": 40}
+        assert client.post("/api/v1/readings", json=late).status_code == 404
+        assert client.post("/api/v1/readings/batch", json=[late]).status_code == 404
+        entry = client.get("/api/v1/audit", params={"subject": f"machine/{machine['key']}"}).json()["items"][0]
+        assert entry["before"]["reading"] > 0
+
+        Shop(empty)  # a real machine, which nothing removes
+        engineer.post("/simulated", 409)
+        engineer.post("/simulated/remove", 404)
 
 
 class TestWithoutConnection:

@@ -16,7 +16,7 @@ import psycopg
 from app.db.connections import LOOK
 from app.db.engine import Database
 from app.db.pipeline import Pipeline
-from app.errors import Busy, DatabaseAway, DiskFull, InbandError, OutcomeUnknown
+from app.errors import Busy, DatabaseAway, DiskFull, InbandError, NotFound, OutcomeUnknown
 from app.language.i18n import _
 from app.loop.readings.records import Entry
 from app.loop.readings.schemas import ReadingIn
@@ -25,7 +25,7 @@ from app.loop.readings.writer.connection import HELD, LAST_ATTEMPT, LONGEST, Att
 from app.loop.readings.writer.load import ParametersCache
 from app.loop.readings.writer.pending import Verdict
 from app.loop.readings.writer.snapshot import Snapshot
-from app.loop.readings.writer.statements import FREE, NOTIFY, array
+from app.loop.readings.writer.statements import FREE, NOTIFY, THERE, array
 from app.loop.readings.writer.transaction import STALE, CommitLost, new_verdicts, transact
 
 log = logging.getLogger(__name__)
@@ -125,6 +125,11 @@ class ReadingStore:
                     if isinstance(error, psycopg.errors.DivisionByZero):
                         self._pessimistic_for = PESSIMISTIC_FOR
                     continue
+                removed = await self._removed(readings) if all_or_nothing or len(readings) == 1 else None
+                if removed:
+                    if all_or_nothing:
+                        raise removed from error
+                    return [removed]
                 if all_or_nothing:
                     raise
                 if len(readings) == 1:
@@ -141,6 +146,16 @@ class ReadingStore:
                     if pipeline.distributed:
                         await self.connection.send(NOTIFY)
                 return outcomes
+
+    async def _removed(self, readings: Sequence[tuple[Entry, ReadingIn]]) -> NotFound | None:
+        """The answer where a machine was removed, as a simulated one may be, since its characteristics were looked up."""
+        machine_ids, pipeline = {entry.machine_id for entry, _reading in readings}, self.connection.pipeline
+        there = machine_ids
+        with suppress(psycopg.Error):
+            if pipeline is not None and not pipeline.closed:
+                (rows,) = await pipeline.run(((THERE, array(machine_ids)),))
+                there = {int(machine_id or 0) for (machine_id,) in rows}
+        return next((_removed(entry) for entry, _reading in readings if entry.machine_id not in there), None)
 
     async def _alone(self, item: tuple[Entry, ReadingIn]) -> Outcome:
         try:
@@ -245,6 +260,15 @@ async def committed(pipeline: Pipeline, lost: CommitLost, seconds: float) -> boo
 def _busy(readings: Sequence[tuple[Entry, ReadingIn]]) -> Busy:
     machines = {entry.machine for entry, _reading in readings}
     return Busy(machines.pop() if len(machines) == 1 else None)
+
+
+def _removed(entry: Entry) -> NotFound:
+    return NotFound(
+        _("There is no characteristic {key} any more: its machine was simulated, and is removed.").format(
+            key=repr(entry.characteristic)
+        ),
+        _("Check the key under Set-up."),
+    )
 
 
 def _unexpected() -> InbandError:

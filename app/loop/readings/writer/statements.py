@@ -35,6 +35,7 @@ WHERE machine_id = ANY($1::int[]) ORDER BY machine_id FOR UPDATE
 """
 # Of these machines the ones that nobody holds.
 FREE = "SELECT machine_id FROM machine_state WHERE machine_id = ANY($1::int[]) FOR UPDATE SKIP LOCKED"
+THERE = "SELECT id FROM machine WHERE id = ANY($1::int[])"
 # Ends the transaction (by a division by zero) unless every machine is still at the version that its readings were decided
 # on; moves the versions on. With several machines LOCK comes first, because an update takes rows in any order.
 _GUARD = """

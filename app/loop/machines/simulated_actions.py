@@ -1,0 +1,80 @@
+"""A simulated machine, for trying an empty plant: set up in one go, and removed again with everything that it has left.
+
+What a real machine has measured stays. Of a simulated one nothing is a fact, so it alone goes, and the record of changes says so. The
+triggers that protect facts are left out of that one transaction, which only a superuser of the database can do: where the server has
+a role of its own, and where the tables lie on several nodes, no simulated machine is offered.
+"""
+
+from typing import Any
+
+from sqlalchemy import column, select, table, text
+from sqlalchemy.orm import Session
+
+from app.access.audit.actions import record
+from app.access.keys import keys_changed
+from app.db.events import publish
+from app.errors import Conflict, NotFound
+from app.language.i18n import _
+from app.loop.machines import actions, queries
+from app.loop.machines.schemas import MachineIn
+from app.loop.tables.machines import Machine
+
+_MAY_GO = text("""
+SELECT current_setting('is_superuser')::bool AND NOT EXISTS (SELECT FROM pg_extension WHERE extname = 'citus')
+""")
+_OF_MACHINES = text("""
+SELECT c.relname FROM pg_class c JOIN pg_attribute a ON a.attrelid = c.oid AND a.attname = 'machine_id' AND NOT a.attisdropped
+WHERE c.relnamespace = current_schema()::regnamespace AND c.relkind IN ('r', 'p') AND NOT c.relispartition ORDER BY 1
+""")
+
+
+def simulated_machine(session: Session) -> Machine | None:
+    """The simulated machine, if there is one."""
+    return session.scalars(select(Machine).where(Machine.simulated)).first()
+
+
+def may_be_removed(session: Session) -> bool:
+    """Tell if a simulated machine could be removed from this database."""
+    return bool(session.scalar(_MAY_GO))
+
+
+def add_simulated_machine(session: Session, machine: MachineIn, actor: str) -> Machine:
+    """Set up a simulated machine on an empty plant. Raises `Conflict` where there is a machine, or it could not be removed."""
+    if queries.machines(session, limit=1):
+        raise Conflict(
+            _("A simulated machine is for an empty plant, and this one has a machine."),
+            _("Try it on a server of its own: inband demo --data-dir FOLDER."),
+        )
+    if not may_be_removed(session):
+        raise Conflict(
+            _("A simulated machine could not be removed again from this database, so none is set up."),
+            _("Try it on a server of its own: inband demo --data-dir FOLDER."),
+        )
+    return actions.add_machine(session, machine, actor, simulated=True)
+
+
+def remove_simulated_machine(session: Session, actor: str) -> dict[str, int]:
+    """Remove the simulated machine with its characteristics, readings, corrections, alarms and keys.
+
+    Return the number of rows that went, by table. Raises `NotFound` where there is none, `Conflict` where it cannot be done.
+    """
+    machine = simulated_machine(session)
+    if machine is None:
+        raise NotFound(_("There is no simulated machine."), _("The plant's page shows the machines that there are."))
+    if not may_be_removed(session):
+        raise Conflict(_("The role that serves may not remove anything."), _("A superuser of the database may."))
+    queries.lock_machines(session, [machine.id])
+    key, name, machine_id = machine.key, machine.name, machine.id
+    session.execute(text("SET LOCAL session_replication_role = replica"))  # without triggers, which keep facts
+    gone = {}
+    for relation in session.scalars(_OF_MACHINES).all():
+        of = table(relation, column("machine_id"))
+        gone[relation] = session.execute(of.delete().where(of.c.machine_id == machine_id)).rowcount
+    session.execute(table("machine", column("id")).delete().where(column("id") == machine_id))
+    session.execute(text("SET LOCAL session_replication_role = origin"))
+    session.expunge(machine)
+    before: dict[str, Any] = {"name": name} | {relation: count for relation, count in gone.items() if count}
+    record(session, actor, "simulated machine removed", f"machine/{key}", before, None)
+    publish(session, {"kind": "machine", "machine": key})
+    keys_changed(session)
+    return gone
