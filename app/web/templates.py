@@ -20,7 +20,7 @@ from starlette.responses import HTMLResponse
 from app import HOUSE, __version__
 from app.db.replica import Replica
 from app.errors import InbandError
-from app.language import i18n, numbers, times
+from app.language import i18n, numbers, short, times
 from app.web import period, states, theme
 from app.web.assets import Assets
 from app.web.doors import door_of, machine_of, search_words, way_to
@@ -94,6 +94,7 @@ def environment() -> Environment:
         as_field=period.field,
         written=lambda at: times.written(at, times.MINUTES),
         ago=numbers.ago,
+        in_short=short.in_short,
     )
     env.globals.update(
         address=address,

@@ -41,7 +41,7 @@ def what_to_do(kind: str) -> str:
 def action_word(action: str) -> str:
     """Return an action as it is on its button."""
     return {
-        "tool_replaced": _("Tool replaced"),
+        "tool_replaced": _("Tool changed"),
         "keep_cutting": _("Keep cutting"),
         "false_reading": _("False reading"),
         "sister_tool": _("Switch to sister tool"),

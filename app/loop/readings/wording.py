@@ -177,12 +177,12 @@ def _sentence(record: Record, parameters: Parameters) -> str:
             text = _("Deviation %(deviation)s: imported from a file. Judged like any other, it corrects nothing.")
         case Code.BEFORE_TOOL_CHANGE:
             text = _(
-                "Deviation %(deviation)s: the part was cut before the tool was changed or its offset edited by hand, "
+                "Deviation %(deviation)s: the part was cut before the tool was changed or its offset edited, "
                 "so it says nothing about the offset of now. Nothing is corrected."
             )
         case Code.OFFSET_LIMIT:
             text = _(
-                "Deviation %(deviation)s asks for a correction, but the corrections of this tool would exceed %(total)s in all. "
+                "Deviation %(deviation)s corrects nothing: the corrections of this tool would exceed %(total)s in all. "
                 "Nothing is corrected until the tool is changed, or the largest sum is raised."
             )
         case Code.IMPLAUSIBLE if record.correction is None:

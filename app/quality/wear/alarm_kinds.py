@@ -9,7 +9,7 @@ HUNTING = register(
         "hunting",
         word=lambda: _("Hunting"),
         sentence=lambda alarm: f"{hunting_sentence(alarm.data)} {remedy_sentence(alarm.data, alarm.data['settings'])}",
-        what_to_do=lambda: _("An engineer chooses a setting on the map of the what-if page and proposes it there."),
+        what_to_do=lambda: _("An engineer chooses a setting on the what-if map and proposes it there."),
         icon="hunting",
     )
 )

@@ -36,7 +36,7 @@ from app.views.characteristic.glance import band_picture
 from app.views.characteristic.wording import state_word
 from app.views.station import queries, sheet_pages
 from app.views.station.who import REFUSED, asked, who
-from app.views.station.wording import first_sentence, next_action
+from app.views.station.wording import next_action
 from app.web.deps import SESSION_COOKIE, STATION_COOKIE, FormDep, Number, SessionDep, SettingsDep, Word, from_this_site
 from app.web.fields import LARGEST_ID
 from app.web.forms import by_field
@@ -138,7 +138,6 @@ def station_page(
             None,
             None if row.stream.last_deviation is None else row.average,  # a mark on the target would pass for a reading
         ),
-        first_sentence=first_sentence,
         next_event=lambda row: next_event(row.outlook),
         wording=alarm_wording,
         outcomes=outcomes,

@@ -14,7 +14,6 @@ from app.language.i18n import _
 from app.loop.machines.queries import machine_named
 from app.loop.readings.by_hand import sheet_actions as sheet
 from app.views.station.who import REFUSED, asked, who
-from app.views.station.wording import first_sentence
 from app.web.deps import FormDep, SessionDep, Word
 from app.web.paging import address
 from app.web.templates import page
@@ -88,7 +87,6 @@ def _sheet(
         key=form.get("key") or token_hex(8),
         typed={"order": kept.get("order"), "gauge": kept.get("gauge")} | dict(form),
         stored=stored,
-        first_sentence=first_sentence,
         questions=questions or {},
         address=address,
         **asked(session, at, form, error),

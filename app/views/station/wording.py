@@ -6,16 +6,6 @@ from app.views.characteristic import wording
 from app.views.station.queries import Station
 
 
-def first_sentence(text: str) -> str:
-    """The part of a reason that is read from two metres; the rest of it is where there is time to read.
-
-    >>> first_sentence("Deviation 6.0 µm is beyond 5.0 µm: corrected in full. The part was cut before it.")
-    'Deviation 6.0 µm is beyond 5.0 µm: corrected in full.'
-    """
-    sentence, dot, rest = text.partition(". ")
-    return f"{sentence}." if dot and rest else text
-
-
 def next_action(station: Station) -> str:
     """Return the next action of a person at this machine: about the characteristic that needs someone first, or an alarm."""
     if station.first is not None:

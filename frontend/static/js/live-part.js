@@ -64,7 +64,7 @@ class LivePart extends HTMLElement {
 
   items(root) {
     const items = this.hasAttribute("still") ? root.querySelectorAll(this.getAttribute("still")) : [];
-    return [...items].map((item) => item.id || item.getAttribute("aria-labelledby"));
+    return [...items].map((item) => item.id || item.dataset.key || item.getAttribute("aria-labelledby"));
   }
 
   /** Says how many items wait to be shown. */

@@ -175,7 +175,7 @@ class TestTwoTouches:
         operator.sign_in(page)
         page.set_viewport_size({"width": 800, "height": 1280})
         page.goto(f"/alarms?machine={shop.machine}")
-        page.get_by_role("link", name="Tool replaced").click()
+        page.get_by_role("link", name="Tool changed").click()
         dialog = page.get_by_role("dialog")
         expect(dialog).to_be_visible()
         for targets in (

@@ -144,7 +144,7 @@ def test_no_words_are_put_into_anybodys_mouth(line: Shop, server: Server) -> Non
     """The choice made in advance repeats the action and no more; a reason for an approval is never chosen."""
     operator = Person(server, "operator")
     worn = line.read(400.0)["alarms"][0]["id"]
-    for action, chosen in (("tool_replaced", "Tool replaced"), ("keep_cutting", "Keep cutting"), ("noted", "Seen")):
+    for action, chosen in (("tool_replaced", "Tool changed"), ("keep_cutting", "Keep cutting"), ("noted", "Seen")):
         assert f'value="{chosen}" checked' in operator.open(f"/alarms/{worn}?action={action}")
     held = line.call("GET", f"/alarms/{worn}")["held_correction"]["number"]
     path = f"/machines/{line.machine}/corrections/{held}"

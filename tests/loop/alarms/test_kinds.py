@@ -2,13 +2,21 @@
 
 import subprocess
 import sys
+from datetime import UTC, datetime
+from typing import Any
 
 import pytest
 
+from app.core.decision.step import Code
+from app.core.parameters import Parameters
+from app.language.short import MOST_WORDS, in_short, words
 from app.loop.alarms.kinds import AlarmKind, kind_named, kinds, register
+from app.loop.readings.records import Record
+from app.loop.readings.wording import reason
 from app.loop.tables.alarms import Alarm
 from app.web import states
 from app.web.templates import environment
+from tests.shop import PARAMETERS
 
 
 @pytest.mark.parametrize("kind", list(kinds()), ids=lambda kind: kind.name)
@@ -31,6 +39,67 @@ def test_a_kind_of_a_newer_version_is_shown_by_its_name() -> None:
     kind = kind_named("coolant_low")
     assert (kind.word(), kind.sentence(Alarm(kind="coolant_low", data={"text": "Low."}))) == ("coolant_low", "Low.")
     assert "noted" in kind.actions
+
+
+_AT = "2026-11-27T04:00:00+00:00"
+_STEP = {"numbers": [17, 18], "amount": -0.0061, "asked": 0.0061, "done": -0.0058}
+_GAIN: dict[str, Any] = {"gain": 0.47, "error": 0.12, "corrections": 14, "characteristic": "Bearing seat Ø40 h6"}
+_SIZE: dict[str, Any] = {"deviation": 0.4123, "limit": 0.3}
+DATA: dict[str, list[dict[str, Any]]] = {
+    "oversize": [_SIZE, _SIZE | {"against": _STEP}],
+    "undersize": [_SIZE],
+    "tool_worn": [_SIZE],
+    "probe_fault": [
+        _SIZE,
+        {"first_move_triggered": True},
+        {"first_move_triggered": True, "feature": "outside"},
+        {"first_move_triggered": True, "feature": "tool"},
+        _SIZE | {"beyond_natural_limit": True},
+        {"touch": {"code": "distance", "point": 2, "repeat": 1, "expected": 0.5, "got": 0.8}},
+        {"touch": {"code": "missing", "point": 2, "repeat": 1, "expected": 1, "got": 0}},
+    ],
+    "acceptance": [{"least": 2, "m": 3}, {}],
+    "offset_limit": [_SIZE],
+    "implausible": [_SIZE],
+    "opposite_effect": [_GAIN | {"corrections": [_STEP, _STEP]}],
+    "offset_differs": [{"reported": -0.0142, "expected": -0.0061}, {"correction": 9, "reported": 1.0, "expected": 0.9}],
+    "corrections_not_taken": [
+        {"waiting": 1, "first": 12, "since": _AT},
+        {"waiting": 4, "first": 12, "since": _AT},
+    ],
+    "unusual_gain": [_GAIN | {"verdict": verdict} for verdict in ("none", "weak", "strong", "opposite")],
+    "tool_life": [{"by": "parts", "parts": 520, "planned_parts": 500}, {"total": 0.21, "planned_total": 0.2}],
+    "bridge_silent": [{"received_at": _AT}],
+    "bridge_backing_up": [{"state": "full", "waiting": 900}, {"waiting": 900, "oldest_waiting_at": _AT}],
+    "machine_fault": [{"location": which} for which in ("battery_low", "receiver", "probe_not_ready", "other")],
+    "calibration_overdue": [{"days": 31, "location": 5}, {"parts": 500, "location": 5, "memory": "tool"}],
+    "fixture_shifted": [{"location": "vice-2", "shifts": {"x": 0.12, "y": -0.3}, "limit": 0.1, "zero": 8}],
+    "kinematics_drift": [{"name": "c-tilt-x", "location": "c", "value": 0.02, "limit": 0.01, "run": 7}],
+    "hunting": [],  # worded with the settings: by the tests of wear
+    "signal": [],  # with the chart: by the tests of signals
+    "calibration_refused": [],  # with the refusal: by the tests of calibration
+}
+
+
+@pytest.mark.parametrize("kind", list(kinds()), ids=lambda kind: kind.name)
+def test_what_is_read_in_passing_has_fifteen_words_at_most_and_nothing_is_broken_off(kind: AlarmKind) -> None:
+    said = [kind.sentence(Alarm(kind=kind.name, tool_memory=3, data=data)) for data in DATA[kind.name]]
+    for text in (*said, kind.what_to_do()):
+        assert words(in_short(text)) <= MOST_WORDS, in_short(text)
+        assert not in_short(text).endswith("…"), text
+
+
+def test_so_it_is_with_every_reason_of_a_decision() -> None:
+    parameters = Parameters(**PARAMETERS, max_total=0.2, plausible_jump=0.03)
+    now = datetime(2026, 11, 27, tzinfo=UTC)
+    for code in Code:
+        record = Record(
+            1, 1, 7, 40.0061, 0.0061, 0.0061, 0.0002, 0.0003, now, now, None, 1, 4, 18, 3, False, "full", "correct", code,
+            None, None, None, None, None,
+        )  # fmt: skip
+        text = reason(record, parameters)["text"]
+        assert words(in_short(text)) <= MOST_WORDS, in_short(text)
+        assert not in_short(text).endswith("…"), text
 
 
 def test_a_name_is_taken_once() -> None:
