@@ -28,6 +28,14 @@ from app.web.templates import page
 router = APIRouter(include_in_schema=False, dependencies=[FROM_REPLICA])
 RUNS = ("200", "1000", "5000", "all")
 FIELDS = ("from", "to", "last", "timezone", "paper")
+HANDED_OVER = (
+    SectionName.SUMMARY,
+    SectionName.NUMBERS,
+    SectionName.CAPABILITY,
+    SectionName.CHART,
+    SectionName.PARAMETERS,
+)
+"""Sections where none is chosen: the first page, and what it rests on. Lists of what happened are appendices that one chooses."""
 
 
 @router.get("/characteristics/{characteristic}/report")
@@ -47,7 +55,7 @@ def report_page(
         tool_since,
     )
     try:
-        report_request, problem = typed(typed_fields, section or ()), None
+        report_request, problem = typed(typed_fields, section or HANDED_OVER), None
     except Invalid as error:
         report_request, problem = ReportRequest(), error
     report = None if problem else queries.report_of(session, current, report_request, datetime.now(UTC), caller.name)

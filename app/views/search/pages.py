@@ -7,6 +7,7 @@ from fastapi import APIRouter, Query, Request, Response
 from starlette.responses import RedirectResponse
 
 from app.access.deps import Viewer, require
+from app.views.characteristic.glance import tolerance_bar
 from app.views.search import parts, queries
 from app.views.search.parts import Part, part_path
 from app.views.search.readings import Filters, cursor_of
@@ -46,7 +47,7 @@ def part_page(
     here = part_path(part)
     more = urlencode({"after": cursor_of(shown[-1].record, Filters())}) if len(rows) > ON_PAGE else None
     listed = PageOfList(shown, f"{here}&{more}" if more else None, here if after else None)
-    return page(request, "search/part.html", name=part, part=listed)
+    return page(request, "search/part.html", name=part, part=listed, bar=tolerance_bar)
 
 
 @router.get("/parts/{part:path}", dependencies=[require("viewer")])

@@ -8,9 +8,10 @@ from pydantic_core import PydanticCustomError
 from sqlalchemy import select, tuple_
 from sqlalchemy.orm import Session
 
+from app.core.parameters import Parameters
 from app.loop.readings.records import Record
 from app.loop.readings.schemas import clean_text
-from app.loop.tables.characteristics import Characteristic
+from app.loop.tables.characteristics import Characteristic, ParametersVersion
 from app.loop.tables.machines import Machine
 from app.loop.tables.tools import Correction
 from app.views.search import readings
@@ -32,13 +33,14 @@ def part_path(part: str) -> str:
 
 
 class PartReading(NamedTuple):
-    """One reading of a part. answer: as it was answered; correction: what became of the one it led to."""
+    """One reading of a part. answer: as it was answered; limits: of then; correction: what became of the one it led to."""
 
     record: Record
     characteristic: str
     machine: str
     machine_name: str
     answer: dict[str, Any]
+    limits: Parameters
     correction: Correction | None
 
 
@@ -57,6 +59,12 @@ def measured(session: Session, part: str, after: str | None, limit: int) -> list
             .where(tuple_(*of).in_(places))
         )
     }
+    of_version = (ParametersVersion.machine_id, ParametersVersion.characteristic_id, ParametersVersion.version)
+    versions = {(*record[:2], record.parameters_version) for record in records}
+    limits = {
+        (row.machine_id, row.characteristic_id, row.version): Parameters.from_dict(row.parameters)
+        for row in session.scalars(select(ParametersVersion).where(tuple_(*of_version).in_(versions)))
+    }
     asked = [(record.machine_id, record.correction) for record in records if record.correction is not None]
     corrections = {
         (row.machine_id, row.number): row
@@ -69,6 +77,7 @@ def measured(session: Session, part: str, after: str | None, limit: int) -> list
             record,
             *names[record.machine_id, record.characteristic_id],
             answer,
+            limits[record.machine_id, record.characteristic_id, record.parameters_version],
             None if record.correction is None else corrections.get((record.machine_id, record.correction)),
         )
         for record, answer in zip(records, readings.answers(session, records), strict=True)

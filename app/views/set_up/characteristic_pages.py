@@ -23,6 +23,8 @@ from app.loop.characteristics.wording import history, result_label
 from app.loop.machines import queries as machines
 from app.loop.programs import queries as programs
 from app.loop.readings import queries as readings
+from app.quality.gauge_studies import queries as gauge_studies
+from app.quality.gauge_studies import wording as gauge_wording
 from app.quality.what_if import queries as what_if
 from app.quality.what_if import wording
 from app.views.set_up import parameter_form
@@ -34,6 +36,7 @@ from app.web.paging import Order, address, part_of
 
 router = APIRouter(include_in_schema=False)
 ON_PAGE = 200
+SAME = 5e-7  # mm; a smaller difference of R33 is none
 LOOKED_BACK = 100  # readings from which a plausible jump is suggested
 
 
@@ -223,6 +226,17 @@ def prefilled_change(
     return _characteristic(request, session, caller, current, typed=names | dict(typed))
 
 
+def _advised(session: Session, current: queries.CurrentCharacteristic) -> dict[str, Any] | None:
+    """R33 as the newest gauge study suggests it, mm, with the study and the reason to give; None where it is so already."""
+    found = gauge_studies.latest_advice(session, current)
+    if found is None or found[1].suggestion.fits is False:
+        return None
+    (row, advice), suggested = found, found[1].suggestion.zero_range
+    if abs(suggested - current.parameters.zero_range) < SAME:
+        return None
+    return {"study": row.study.id, "zero_range": suggested, "reason": gauge_wording.reason(row.study.id, advice)}
+
+
 def _characteristic(
     request: Request,
     session: Session,
@@ -262,6 +276,7 @@ def _characteristic(
             for row in what_if.proposals(session, characteristic=characteristic, status="open")
         ],
         suggested_jump=_suggested_jump(session, current),
+        advised=_advised(session, current),
         source=None if current.source is None else queries.characteristic_named(session, current.source),
         forms=forms,
         form_choices=[

@@ -246,6 +246,7 @@ class TestInTheBrowser:
         expect(page.get_by_text("The study is stored.")).to_be_visible()
         expect(page.locator("plotly-chart .main-svg").first).to_be_visible()
         expect(page.get_by_text("R33 is too small")).to_be_visible()
+        assert "suggests R33 = 1.8 µm" in engineer.open(f"/setup/characteristics/{shop.characteristic}")
         page.get_by_role("link", name="Open the parameters with R33 = 1.8 µm").click()
         expect(page.locator("[name=zero_range]")).to_have_value("0.0018")
         expect(page.locator("[name=reason]")).to_have_value(re.compile("Gauge study .* repeatability 0.6"))

@@ -10,6 +10,7 @@ from pypdf import PdfReader
 
 from app.quality.proof import queries as proof
 from app.quality.proof.cases import cases
+from app.views.reports.request import SectionName
 from tests.shop import Person, Shop
 from tests.views.reports.story import PERIOD, SAID, facts, file, report, table
 
@@ -197,8 +198,13 @@ def test_the_first_page_is_what_is_signed_and_the_rest_are_appendices(story: Sho
 def test_the_page_shows_every_value_in_the_same_words(story: Shop, whole: Any, viewer: Person) -> None:
     from html import unescape
 
-    text = plain(unescape(viewer.open(f"/characteristics/{story.characteristic}/report?{PERIOD}")))
+    page = f"/characteristics/{story.characteristic}/report?{PERIOD}"
+    chosen = "".join(f"&section={name}" for name in SectionName)
+    text = plain(unescape(viewer.open(page + chosen)))
     assert [said for said in said_in(whole) if plain(said) not in text] == []
+    usual = viewer.open(page)
+    assert 'id="section-summary"' in usual
+    assert 'id="section-decisions"' not in usual  # an appendix that one chooses
 
 
 def test_the_xlsx_holds_the_numbers_as_numbers(story: Shop, whole: Any) -> None:

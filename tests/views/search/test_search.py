@@ -100,6 +100,7 @@ def test_the_page_of_a_part(searched: Shop, viewer: Person) -> None:
     readings = re.findall(r'class="row-name" href="(/characteristics/[^"]+/readings/\d+)"', text)
     assert readings == [f"/characteristics/{searched.characteristic}{b}/readings/1" for b in ("-b", "")]
     assert "Pending" in text or "Superseded" in text, "the page says what became of the correction"
+    assert text.count('class="tolerance-bar"') == 2
     for path in readings:
         viewer.open(path)
     number = searched.correction(1)["number"]

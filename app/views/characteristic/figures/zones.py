@@ -37,7 +37,7 @@ NARROW = 640  # pixels below which there is room for the name and value of a lim
 MANY = 300  # readings, of more the eye is led by the envelope of so many neighbours that there are GROUPS of them
 GROUPS = 150
 WORD = 70  # pixels that a value in the chart takes
-EVENTS, READINGS, OFFSETS = (0.915, 1.0), (0.18, 0.91), (0.0, 0.14)  # of the height, from the bottom
+EVENTS, READINGS, OFFSETS = (0.935, 1.0), (0.165, 0.93), (0.0, 0.135)  # of the height, from the bottom
 
 
 @dataclass(frozen=True)
