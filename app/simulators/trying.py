@@ -19,7 +19,7 @@ from inband_client import Client, Forbidden, NotFound, Stopped, Unauthorized, Un
 
 log = logging.getLogger(__name__)
 SPEED = 30.0  # times faster than life
-PATIENCE = 30.0  # s that the server may be away
+PATIENCE = 30.0  # s without an answer of the server
 
 _LATHE = replace(
     plant.LATHE_1,
@@ -58,7 +58,7 @@ def settings(machine: plant.Machine) -> dict[str, str]:
 
 
 def characteristics(machine: plant.Machine) -> list[dict[str, Any]]:
-    """What it measures, as the API takes it."""
+    """Its characteristics, as the API takes them."""
     return [
         {
             "key": each.key,

@@ -7,7 +7,7 @@ a role of its own, and where the tables lie on several nodes, no simulated machi
 
 from typing import Any
 
-from sqlalchemy import column, select, table, text
+from sqlalchemy import column, func, literal, select, table, text
 from sqlalchemy.orm import Session
 
 from app.access.audit.actions import record
@@ -69,7 +69,8 @@ def remove_simulated_machine(session: Session, actor: str) -> dict[str, int]:
     gone = {}
     for relation in session.scalars(_OF_MACHINES).all():
         of = table(relation, column("machine_id"))
-        gone[relation] = session.execute(of.delete().where(of.c.machine_id == machine_id)).rowcount
+        removed = of.delete().where(of.c.machine_id == machine_id).returning(literal(1).label("one")).cte()
+        gone[relation] = session.scalar(select(func.count()).select_from(removed)) or 0
     session.execute(table("machine", column("id")).delete().where(column("id") == machine_id))
     session.execute(text("SET LOCAL session_replication_role = origin"))
     session.expunge(machine)

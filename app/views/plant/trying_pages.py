@@ -35,7 +35,7 @@ def simulator() -> ModuleType | None:
 
 
 def trying(session: Session, *, empty: bool) -> dict[str, Any]:
-    """What the plant's page says of it. offer: `there`, `not installed`, `no right`; simulated: the machine that is there."""
+    """The state of it for the plant's page. offer: `there`, `not installed`, `no right`; simulated: the machine that is there."""
     if empty:
         there = "there" if may_be_removed(session) else "no right"
         return {"offer": there if find_spec("app.simulators") is not None else "not installed", "simulated": None}
