@@ -19,10 +19,10 @@ from app.errors import NotFound
 from app.language.i18n import _
 from app.loop.characteristics.actions import add_characteristic
 from app.loop.characteristics.schemas import CharacteristicIn
+from app.loop.machines import keys
 from app.loop.machines import simulated_actions as actions
 from app.loop.machines.schemas import MachineIn
 from app.loop.machines.simulated_actions import may_be_removed, simulated_machine
-from app.loop.tables.machines import Machine
 from app.web.deps import SessionDep
 
 router = APIRouter(include_in_schema=False)
@@ -39,11 +39,10 @@ def trying(session: Session, *, empty: bool) -> dict[str, Any]:
     if empty:
         there = "there" if may_be_removed(session) else "no right"
         return {"offer": there if find_spec("app.simulators") is not None else "not installed", "simulated": None}
-    machine, program = simulated_machine(session), simulator()
-    return {
-        "simulated": machine,
-        "runs": program is not None and machine is not None and program.is_running(machine.key),
-    }
+    if (machine := simulated_machine(session)) is None:
+        return {"simulated": None}
+    program = simulator()
+    return {"simulated": machine, "runs": program is not None and program.is_running(machine.key)}
 
 
 @router.post("/simulated")
@@ -56,19 +55,21 @@ def start(request: Request, session: SessionDep, caller: Engineer) -> Response:
             _("Install its wheel into the environment of Inband: pip install --no-deps FILE."),
         )
     machine = simulated_machine(session)
-    if machine is None:
-        machine = _set_up(session, program, caller.name)
-    secret = add_key(session, name=KEY_NAME, machine=machine.key, actor=caller.name).secret
-    begin = BackgroundTask(program.start, _own_address(request), secret, machine.key)
+    if machine is not None:  # one that another process simulates still ends
+        for old in keys.machine_keys(session, machine.id):
+            keys.revoke_machine_key(session, machine.key, old.id, caller.name)
+    key = _set_up(session, program, caller.name) if machine is None else machine.key
+    secret = add_key(session, name=KEY_NAME, machine=key, actor=caller.name).secret
+    begin = BackgroundTask(program.start, _own_address(request), secret, key)
     return RedirectResponse("/", 303, background=begin)
 
 
-def _set_up(session: Session, program: ModuleType, actor: str) -> Machine:
+def _set_up(session: Session, program: ModuleType, actor: str) -> str:
     spec = program.fresh()
-    machine = actions.add_simulated_machine(session, MachineIn(**program.settings(spec)), actor)
+    actions.add_simulated_machine(session, MachineIn(**program.settings(spec)), actor)
     for each in program.characteristics(spec):
         add_characteristic(session, CharacteristicIn(**each), actor)
-    return machine
+    return str(spec.key)
 
 
 def _own_address(request: Request) -> str:
