@@ -347,6 +347,8 @@ OF_MANY_READINGS = ("/baselines", "/trial", "/baselines/preview", "/gauge-studie
 FORMS: dict[str, tuple[str, ...] | None] = {
     "/account/password": None,
     "/account/pin": None,
+    "/simulated": ("add_machine",),
+    "/simulated/remove": ("add_machine",),
     "/alarms/{number}/acknowledge": ("acknowledge_alarm",),
     "/alarms/{number}/affected": ("set_parts_aside",),
     "/characteristics/{characteristic}/trial/start": ("start_correcting",),
