@@ -1,14 +1,14 @@
 """A machine that is simulated says so, for good: it alone can be removed again, with all that it has left.
 
-Revision ID: 0123
-Revises: 0122
+Revision ID: 0124
+Revises: 0123
 Create Date: 2026-11-27
 """
 
 from alembic import op
 
-revision = "0123"
-down_revision: str | None = "0122"
+revision = "0124"
+down_revision: str | None = "0123"
 branch_labels = None
 depends_on = None
 

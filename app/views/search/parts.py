@@ -60,7 +60,7 @@ def measured(session: Session, part: str, after: str | None, limit: int) -> list
         )
     }
     of_version = (ParametersVersion.machine_id, ParametersVersion.characteristic_id, ParametersVersion.version)
-    versions = {(*record[:2], record.parameters_version) for record in records}
+    versions = {(record.machine_id, record.characteristic_id, record.parameters_version) for record in records}
     limits = {
         (row.machine_id, row.characteristic_id, row.version): Parameters.from_dict(row.parameters)
         for row in session.scalars(select(ParametersVersion).where(tuple_(*of_version).in_(versions)))
