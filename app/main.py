@@ -48,6 +48,9 @@ from app.loop.connections import jobs as connection_jobs
 from app.loop.connections import pages as connection_pages
 from app.loop.connections.touch_tests import api as touch_tests_api
 from app.loop.connections.touch_tests import pages as touch_test_pages
+from app.loop.control_plan import api as control_plan
+from app.loop.control_plan import jobs as control_plan_jobs
+from app.loop.control_plan import pages as control_plan_pages
 from app.loop.faults import api as faults
 from app.loop.machines import api as machines
 from app.loop.machines import keys_api as machine_keys
@@ -187,6 +190,7 @@ ROUTERS: tuple[APIRouter, ...] = (
     text_api.router,
     alarms.router,
     quarantine.router,
+    control_plan.router,
     notes.router,
     notifications.router,
     events_api.router,
@@ -219,6 +223,7 @@ ROUTERS: tuple[APIRouter, ...] = (
     six_pack.router,
     alarm_pages.router,
     quarantine_pages.router,
+    control_plan_pages.router,
     note_pages.router,
     queue_pages.router,
     text_pages.router,
@@ -247,6 +252,7 @@ JOBS: tuple[PeriodicJob, ...] = (
     *tool_jobs.JOBS,
     wear_actions.JOB,
     jobs.JOB,
+    control_plan_jobs.JOB,
     report_actions.JOB,
     signals_actions.JOB,
     capability_actions.JOB,

@@ -47,6 +47,7 @@ WITH_A_LIFE = frozenset(
         "correction",
         "machine",
         "machine_state",
+        "missed_measurement",
         "note",
         "paired_reading",
         "parameter_proposal",

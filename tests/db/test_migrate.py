@@ -76,6 +76,8 @@ ADDED_TABLES = {
     "delivery",
     "quarantine",
     "quarantined_part",
+    "control_plan",
+    "missed_measurement",
 }
 
 

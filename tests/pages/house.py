@@ -94,6 +94,10 @@ PAGES = {
         "/characteristics/{characteristic}/trial",
         "/characteristics/{characteristic}-empty/trial",
     ],
+    "/characteristics/{characteristic}/control-plan": [
+        "/characteristics/{characteristic}/control-plan",
+        "/characteristics/{characteristic}-empty/control-plan",
+    ],
     "/characteristics/{characteristic}/trial/start": ["/characteristics/{characteristic}/trial/start"],
     "/shift": ["/shift", "/shift?machine={machine}", "/shift?at=2020-01-01"],
     "/ledger": ["/ledger", "/ledger?machine={machine}"],
@@ -337,6 +341,8 @@ def furnished(server: Server) -> Shop:
     )
     made.call("POST", "/notes", 201, characteristic=made.characteristic, sequence=3, text="New batch of bars")
     made.call("POST", "/quarantines", 201, alarm=made.alarms()[0]["id"], reason="Edge broken amid the batch")
+    rules: dict[str, Any] = {"every": 5, "minutes": 240.0, "per_shift": True, "after_change": 3, "after_alarm": 10}
+    made.call("PUT", f"/characteristics/{made.characteristic}/control-plan", **rules, reason="As agreed with quality")
     _notified(made)
     return made
 

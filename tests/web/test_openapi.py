@@ -352,6 +352,7 @@ FORMS: dict[str, tuple[str, ...] | None] = {
     "/alarms/{number}/acknowledge": ("acknowledge_alarm",),
     "/alarms/{number}/affected": ("set_parts_aside",),
     "/characteristics/{characteristic}/trial/start": ("start_correcting",),
+    "/characteristics/{characteristic}/control-plan": ("set_control_plan",),
     "/quarantines/{number}/parts/{part}/{what}": ("measure_part_again", "release_part", "scrap_part"),
     "/alignments/new": ("align",),
     "/alignments/pallets/new": ("compose_pallet",),

@@ -44,19 +44,24 @@ def _raised(session: Session, alarm: Alarm, data: dict[str, Any]) -> Alarm:
     return alarm
 
 
+def _active_of_characteristic(
+    session: Session, machine_id: int, characteristic_id: int, kind: AlarmKind
+) -> Alarm | None:
+    return session.scalars(
+        select(Alarm)
+        .where(
+            Alarm.machine_id == machine_id,
+            Alarm.characteristic_id == characteristic_id,
+            Alarm.kind == kind.name,
+            Alarm.acknowledged_at.is_(None),
+        )
+        .execution_options(populate_existing=True)
+    ).one_or_none()
+
+
 def is_active(session: Session, machine_id: int, characteristic_id: int, kind: AlarmKind) -> bool:
     """Tell if an alarm of this kind about a characteristic is active."""
-    return (
-        session.scalar(
-            select(Alarm.id).where(
-                Alarm.machine_id == machine_id,
-                Alarm.characteristic_id == characteristic_id,
-                Alarm.kind == kind.name,
-                Alarm.acknowledged_at.is_(None),
-            )
-        )
-        is not None
-    )
+    return _active_of_characteristic(session, machine_id, characteristic_id, kind) is not None
 
 
 def raise_for_characteristic(
@@ -68,16 +73,7 @@ def raise_for_characteristic(
     data: dict[str, Any],
 ) -> Alarm:
     """Raise an alarm about a characteristic that no reading raises, or count one more if it is active already."""
-    active = session.scalars(
-        select(Alarm)
-        .where(
-            Alarm.machine_id == machine_id,
-            Alarm.characteristic_id == characteristic_id,
-            Alarm.kind == kind.name,
-            Alarm.acknowledged_at.is_(None),
-        )
-        .execution_options(populate_existing=True)
-    ).one_or_none()
+    active = _active_of_characteristic(session, machine_id, characteristic_id, kind)
     return _raised(
         session,
         active
@@ -121,6 +117,20 @@ def settle_for_tool(
 ) -> Alarm | None:
     """As `settle_for_place`, of an alarm about a tool."""
     return _settled(session, _active_of_tool(session, machine_id, tool_memory, kind), by, comment, outcome)
+
+
+def settle_for_characteristic(
+    session: Session,
+    machine_id: int,
+    characteristic_id: int,
+    kind: AlarmKind,
+    by: str,
+    comment: str,
+    outcome: dict[str, Any],
+) -> Alarm | None:
+    """As `settle_for_place`, of an alarm about a characteristic."""
+    active = _active_of_characteristic(session, machine_id, characteristic_id, kind)
+    return _settled(session, active, by, comment, outcome)
 
 
 def _settled(session: Session, active: Alarm | None, by: str, comment: str, outcome: dict[str, Any]) -> Alarm | None:

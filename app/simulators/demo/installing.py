@@ -27,6 +27,9 @@ def set_up(admin: Client, machine: plant.Machine) -> None:
     for feature in machine.features:
         body = {"key": feature.key, "name": feature.name, "machine": machine.key, "part": machine.part}
         _unless_there(admin, "/characteristics", body | {"parameters": feature.parameters}, feature.key)
+        path = f"/characteristics/{feature.key}/control-plan"
+        if feature.plan and admin.get(path)["since"] is None:
+            admin.call("PUT", path, json=feature.plan | {"reason": "As the customer asks for"})
 
     for tool in machine.tools:
         path = f"/machines/{machine.key}/tools/{tool.number}"

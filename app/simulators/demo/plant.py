@@ -46,6 +46,8 @@ class Feature:
     touches: tuple[int, int] | None = None  # points, repeats
     shape: tuple[float, ...] = ()  # how far each point lies from the size: run-out, out-of-roundness, taper
     more: dict[str, Any] = field(default_factory=dict)  # parameters beyond these
+    plan: dict[str, Any] = field(default_factory=dict)  # how often it is measured
+    skipped: tuple[int, int] = (0, 0)  # from this live part on until before that one the probe is switched off
 
     @property
     def target(self) -> float:
@@ -117,6 +119,7 @@ LATHE_1 = Machine(
         Feature(
             "shaft-d40", "Bearing seat Ø40 h6", 3, LATHE_OUTSIDE, 40.0, 0.0, -0.016, factor=-1,
             average_memory=5, warmth=0.009, more={"averaging_limit": 0.0053, "max_step": 0.5, "direction": "negative"},
+            plan={"every": 1, "per_shift": True},
         ),
         Feature(
             "shaft-d35", "Bearing seat Ø35 h6", 3, LATHE_OUTSIDE, 35.0, 0.0, -0.016, factor=-1,
@@ -159,6 +162,7 @@ LATHE_2 = Machine(
             "flange-t18", "Flange thickness 18", 9, LENGTH, 18.0, 0.05, -0.05, factor=-1,
             average_memory=3, zero_range=0.005, scatter=0.004, warmth=0.012,
             more={"mode": "measure_only", "axis": "Z", "direction": "negative"},
+            plan={"every": 5, "after_change": 3, "after_alarm": 10}, skipped=(25, 75),
         ),
     ),
     first_chip=(70, 2),

@@ -138,7 +138,8 @@ class Machine:
         probes: list[Probe] = []
         while self.pipeline and (self.pipeline[0].due <= self.serial or drain):
             part = self.pipeline.popleft()
-            probes += [self._probe(at, feature, part) for at, feature in enumerate(self.spec.features)]
+            probed = [self._probe(at, feature, part) for at, feature in enumerate(self.spec.features)]
+            probes += [probe for probe in probed if (self.live_parts or 0) not in range(*probe.feature.skipped)]
             if drain:
                 break
         return probes

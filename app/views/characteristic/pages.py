@@ -28,6 +28,9 @@ from app.loop.calibration import queries as calibrations
 from app.loop.characteristics import queries
 from app.loop.characteristics.queries import CurrentCharacteristic
 from app.loop.characteristics.wording import history, in_order, label, result_label, worded
+from app.loop.control_plan import queries as control_plans
+from app.loop.control_plan import wording as plan_words
+from app.loop.control_plan.queries import Look
 from app.loop.notes import queries as notes
 from app.loop.notes.queries import NEWEST, NoteRow
 from app.loop.readings import actions as readings
@@ -119,6 +122,17 @@ class CharacteristicView:
     def decisions(self) -> list[Decision]:
         return decisions(self._session, self.current, before=self._before, limit=DECISIONS_ON_PAGE + 1)
 
+    @cached_property
+    def plan(self) -> Look | None:
+        """The control plan as it is kept; None where nothing is planned."""
+        row = control_plans.plan_of(self._session, self.current)
+        return control_plans.look(self._session, row, self.now) if row is not None and row.plan.asks else None
+
+    @cached_property
+    def missed(self) -> int:
+        """Measurements of the plan that were missed in the last 30 days."""
+        return control_plans.missed_lately(self._session, self.current.characteristic, self.now)[0]
+
     @property
     def notes(self) -> list[NoteRow]:
         return notes.notes(self._session, characteristic=self.current.characteristic, limit=NEWEST)
@@ -169,6 +183,7 @@ def characteristic_page(
         edge=edge,
         wear_url=f"/api/v1{path}/figures/wear?{urlencode({'last': edge})}",
         wear_words=WearWords,
+        plan_words=plan_words,
         wanted=lambda part: x_live_part is None or x_live_part == part,
         failing=with_job_words(failures_of(session, current.machine.id, current.characteristic.id)),
         may_see_jobs=caller.may("engineer"),

@@ -8,6 +8,7 @@ from app.files.documents.content import Column, Fact, Section, Table, count, dev
 from app.language.i18n import _
 from app.loop.alarm_response import wording as alarm_wording
 from app.loop.characteristics import wording
+from app.loop.control_plan import queries as control_plan
 from app.loop.notes.queries import on_charts_of
 from app.loop.quarantine import wording as quarantine_wording
 from app.loop.quarantine.tables import QuarantinedPart
@@ -71,8 +72,20 @@ def alarms(frame: Frame) -> Section:
     facts = (
         Fact("raised", _("Alarms"), count(total)),
         Fact("active", _("Not acknowledged yet"), count(waiting)),
+        *_missed(frame),
     )
     return Section("alarms", _("Alarms"), facts=facts, table=table if rows else None)
+
+
+def _missed(frame: Frame) -> list[Fact]:
+    """Deviations from the control plan; none where there was no plan."""
+    if frame.span is None or control_plan.plan_of(frame.session, frame.current) is None:
+        return []
+    number, parts = control_plan.count_missed(frame.session, frame.current.characteristic, frame.span)
+    facts = [Fact("measurements_missed", _("Measurements missed"), count(number))]
+    if parts:
+        facts.append(Fact("parts_not_measured", _("Parts cut without them, at least"), count(parts)))
+    return facts
 
 
 def notes(frame: Frame) -> Section | None:

@@ -1,0 +1,188 @@
+"""Control plan of a characteristic: how often it is measured, which measurement is due, and which was missed.
+
+A part counts as cut once another characteristic of it was measured, or once a later number shows it (`Plan.numbered`). The part
+that is being worked on is never missed: it counts when a later one was begun. Where nothing tells of parts their number is None:
+not known is not missed. Minutes count while the machine runs: between two readings of the same part's characteristics that are at
+most `PAUSE` apart. Times are seconds of one clock.
+"""
+
+from collections import Counter
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from enum import StrEnum
+from itertools import pairwise
+from typing import NamedTuple
+
+from app.core.affected import names_between
+
+PAUSE = 15 * 60.0
+"""Seconds without a reading of the part, beyond which the machine is not known to have run."""
+
+
+class By(StrEnum):
+    """The rule of a plan by which a measurement is due or was missed."""
+
+    PARTS = "parts"
+    MINUTES = "minutes"
+    SHIFT = "shift"
+
+
+class Tightened(StrEnum):
+    """The event after which every part is measured for a while."""
+
+    TOOL_CHANGE = "tool_change"
+    ALARM = "alarm"
+
+
+class Due(StrEnum):
+    """The next measurement: not planned, not due yet, due with the next part, or missed."""
+
+    NOT_PLANNED = "not_planned"
+    LATER = "later"
+    DUE = "due"
+    MISSED = "missed"
+
+
+@dataclass(frozen=True, slots=True)
+class Plan:
+    """The rules by which a characteristic is measured.
+
+    every: 1 in so many parts; minutes: at least once in so many minutes of running; per_shift: at least once in each shift in
+    which the part is made. after_change, after_alarm: every part for so many readings. on_the_way: parts that lie between the
+    machine and the gauge. numbered: parts are numbered one by one, so that a number that is missing is a part.
+    """
+
+    every: int | None = None
+    minutes: float | None = None
+    per_shift: bool = False
+    after_change: int = 0
+    after_alarm: int = 0
+    on_the_way: int = 0
+    numbered: bool = False
+
+    @property
+    def asks(self) -> bool:
+        """Tell if it asks for anything."""
+        return bool(self.every or self.minutes or self.per_shift or self.after_change or self.after_alarm)
+
+
+class Moment(NamedTuple):
+    """A reading. source: its characteristic; part: its name, if it has one; shift: the begin of the plant's shift it lies in."""
+
+    at: float
+    source: int
+    part: str | None = None
+    shift: float = 0.0
+
+
+class Ran(NamedTuple):
+    """All that is known of the time since a reading.
+
+    parts: parts cut since and not measured, without the one that is being worked on; None: nothing tells. minutes: that the
+    machine ran. shifts: shifts that are over, in which the part was made and not measured.
+    """
+
+    parts: int | None = None
+    minutes: float = 0.0
+    shifts: int = 0
+
+
+class Rhythm(NamedTuple):
+    """The interval in force: every n-th part, or None where parts do not count. tightened: why it is every part now."""
+
+    every: int | None
+    tightened: Tightened | None = None
+
+
+class Judged(NamedTuple):
+    """The state of a plan. by: the rule that says so. next_in: parts until the one to measure (1: the next); None: not known."""
+
+    due: Due
+    by: By | None = None
+    next_in: int | None = None
+
+
+def rhythm(plan: Plan, since_change: int | None, since_alarm: int | None) -> Rhythm:
+    """The interval in force after so many readings since the tool change and since the last alarm; None: there was none.
+
+    >>> plan = Plan(every=5, after_change=3, after_alarm=10)
+    >>> rhythm(plan, 2, None), rhythm(plan, 3, 9).every, rhythm(plan, 3, 10).every
+    (Rhythm(every=1, tightened=<Tightened.TOOL_CHANGE: 'tool_change'>), 1, 5)
+    """
+    if since_alarm is not None and since_alarm < plan.after_alarm:
+        return Rhythm(1, Tightened.ALARM)
+    if since_change is not None and since_change < plan.after_change:
+        return Rhythm(1, Tightened.TOOL_CHANGE)
+    return Rhythm(plan.every)
+
+
+def ran(
+    plan: Plan,
+    last: Moment,
+    others: Iterable[Moment],
+    *,
+    now: Moment,
+    measured: frozenset[str] = frozenset(),
+    closed: bool = False,
+) -> Ran:
+    """All that is known of the time from the reading `last` to `now`.
+
+    others: readings of other characteristics of the same part between them, in any order. closed: `now` is the reading that
+    ended it; else it is this moment. measured: names of parts that were measured, whenever.
+
+    >>> others = [Moment(60.0, 2, "P8"), Moment(120.0, 2, "P9"), Moment(180.0, 2, "P10")]
+    >>> ran(Plan(every=1), Moment(0.0, 1, "P7"), others, now=Moment(200.0, 1))
+    Ran(parts=2, minutes=3.0, shifts=0)
+    """
+    signs = sorted(each for each in others if last.at < each.at <= now.at)
+    steps = (after.at - before.at for before, after in pairwise([last, *signs]))
+    shifts = {each.shift for each in signs} - {last.shift, now.shift}
+    return Ran(
+        _parts(plan, last, signs, now.part if closed else None, measured),
+        sum(step for step in steps if step <= PAUSE) / 60,
+        len(shifts),
+    )
+
+
+def _parts(
+    plan: Plan, last: Moment, signs: Sequence[Moment], until: str | None, measured: frozenset[str]
+) -> int | None:
+    newest = until or next((each.part for each in reversed(signs) if each.part is not None), None)
+    counts = []
+    if plan.numbered and newest is not None and (names := names_between(last.part, newest)) is not None:
+        counts.append(names if isinstance(names, int) else len(set(names) - measured))
+    if signs:
+        named = {each.part for each in signs if each.part is not None} - measured - {last.part, newest}
+        unnamed = Counter(each.source for each in signs if each.part is None)
+        counts.append(max(len(named), max(unnamed.values(), default=1) - 1))  # one of these is being worked on
+    return max(counts, default=None)
+
+
+def judged(plan: Plan, interval: Rhythm, since: Ran, *, in_this_shift: bool, closed: bool = False) -> Judged:
+    """Judge the time since the last reading. in_this_shift: it lies in the current shift. closed: the next reading has come.
+
+    >>> plan = Plan(every=5)
+    >>> [judged(plan, rhythm(plan, None, None), Ran(parts), in_this_shift=True).due.value for parts in (3, 4, 5)]
+    ['later', 'due', 'missed']
+    """
+    if not plan.asks:
+        return Judged(Due.NOT_PLANNED)
+    every, parts = interval.every, since.parts
+    under_way = (
+        0 if closed and plan.numbered else plan.on_the_way
+    )  # a number between two that were measured is late for good
+    known = None if parts is None else max(0, parts - under_way)
+    next_in = None if every is None or (parts is None and every > 1) else max(1, every - (known or 0))
+    if every is not None and known is not None and known >= every:
+        return Judged(Due.MISSED, By.PARTS, 1)
+    if plan.minutes is not None and since.minutes > plan.minutes:
+        return Judged(Due.MISSED, By.MINUTES, 1)
+    if plan.per_shift and since.shifts:
+        return Judged(Due.MISSED, By.SHIFT, 1)
+    if closed:
+        return Judged(Due.LATER)
+    if next_in == 1:
+        return Judged(Due.DUE, By.PARTS, 1)
+    if plan.per_shift and not in_this_shift:
+        return Judged(Due.DUE, By.SHIFT, 1)
+    return Judged(Due.LATER, None, next_in)

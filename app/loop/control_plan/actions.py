@@ -1,0 +1,157 @@
+"""Setting a control plan, and keeping it: missed measurements are put on record, raise an alarm, and end."""
+
+from datetime import UTC, datetime
+from typing import Any
+
+from sqlalchemy import update
+from sqlalchemy.orm import Session
+
+from app.access.audit.actions import record
+from app.access.callers import Caller
+from app.core.control_plan import Due, Plan
+from app.db.events import publish
+from app.language.i18n import _
+from app.loop.alarms import actions as alarms
+from app.loop.characteristics.queries import characteristic_named
+from app.loop.control_plan import queries
+from app.loop.control_plan.alarm_kinds import MISSED
+from app.loop.control_plan.queries import Look
+from app.loop.control_plan.schemas import ControlPlanIn
+from app.loop.control_plan.tables import ControlPlan, MissedMeasurement
+from app.loop.machines.queries import lock_machines
+from app.loop.tables.characteristics import Characteristic
+from app.loop.tables.machines import Machine
+from app.loop.tables.readings import Stream
+
+ACTOR = "inband"
+
+
+def set_plan(session: Session, key: str, given: ControlPlanIn, caller: Caller) -> ControlPlan:
+    """Set the plan of a characteristic: it counts from now on, and what was missed under the old one ends. Raises `NotFound`."""
+    current = characteristic_named(session, key)
+    machine, characteristic = current.machine, current.characteristic
+    lock_machines(session, [machine.id])
+    row = queries.plan_of(session, current)
+    before, after = queries.stated(row), given.plan
+    if row is not None and before == after:
+        return row
+    if row is None:
+        row = ControlPlan(machine_id=machine.id, characteristic_id=characteristic.id)
+        session.add(row)
+    for name, value in _fields(after).items():
+        setattr(row, name, value)
+    row.changed_by, row.reason, row.since = caller.name, given.reason, datetime.now(UTC)
+    row.seen = session.get_one(Stream, (machine.id, characteristic.id), populate_existing=True).sequence
+    session.flush()
+    _end(session, row, machine.key, key, by=caller.name, comment=given.reason, outcome={"code": "plan_changed"})
+    changes = {name for name, value in _fields(after).items() if value != getattr(before, name)}
+    record(
+        session,
+        caller.name,
+        "control plan set",
+        f"characteristic/{key}",
+        {name: getattr(before, name) for name in changes},
+        {name: getattr(after, name) for name in changes},
+        given.reason,
+    )
+    publish(session, {"kind": "characteristic", "machine": machine.key, "characteristic": key})
+    return row
+
+
+def _fields(plan: Plan) -> dict[str, Any]:
+    return {name: getattr(plan, name) for name in Plan.__dataclass_fields__}
+
+
+def keep(session: Session, machine_id: int, characteristic_id: int) -> None:
+    """Look at a plan, put on record what was missed, and raise or end the alarm. Done again it changes nothing.
+
+    The machine is locked only where an alarm begins or ends: no reading waits for the rest.
+    """
+    row = session.get_one(ControlPlan, (machine_id, characteristic_id), populate_existing=True)
+    found = queries.look(session, row)
+    if _changes_alarm(found):
+        lock_machines(session, [machine_id])
+        session.expire_all()
+        found = queries.look(session, row)
+    open_, late = found.open, found.late
+    characteristic = session.get_one(Characteristic, (machine_id, characteristic_id))
+    machine = session.get_one(Machine, machine_id)
+    if open_ is not None and found.sequence > open_.after:
+        closing = next((each for each in late if each.after == open_.after), None)
+        if closing is not None:
+            _known(open_, closing.ran)
+            late = [each for each in late if each is not closing]
+        measured = closing.until if closing and closing.until else found.sequence
+        outcome = {"code": "measured", "sequence": measured}
+        _end(session, row, machine.key, characteristic.key, by=ACTOR, comment=_("Measured again"), outcome=outcome)
+        open_ = None
+    for each in late:
+        missed = _missed(row, each.after, each.every, each.judged.by)
+        _known(missed, each.ran)
+        missed.until, missed.ended_at = each.until, datetime.now(UTC)
+        session.add(missed)
+    if open_ is not None:
+        _known(open_, found.since)
+    elif found.judged.due is Due.MISSED:
+        _raise(session, found, machine.key, characteristic.key)
+    session.execute(
+        update(ControlPlan)
+        .where(
+            ControlPlan.machine_id == machine_id,
+            ControlPlan.characteristic_id == characteristic_id,
+            ControlPlan.since == row.since,
+        )
+        .values(seen=found.sequence)
+        .execution_options(synchronize_session=False)
+    )
+    if late:
+        publish(session, {"kind": "characteristic", "machine": machine.key, "characteristic": characteristic.key})
+
+
+def _changes_alarm(found: Look) -> bool:
+    if found.open is not None:
+        return found.sequence > found.open.after
+    return found.judged.due is Due.MISSED
+
+
+def _missed(row: ControlPlan, after: int, every: int | None, by: Any) -> MissedMeasurement:
+    return MissedMeasurement(
+        machine_id=row.machine_id, characteristic_id=row.characteristic_id, after=after, every=every, by=by.value
+    )
+
+
+def _known(missed: MissedMeasurement, ran: Any) -> None:
+    missed.parts, missed.minutes, missed.shifts = ran.parts, ran.minutes, ran.shifts
+
+
+def _raise(session: Session, found: Look, machine: str, characteristic: str) -> None:
+    """Put the missed measurement on record, and raise its alarm; the machine is locked."""
+    row = found.row
+    missed = _missed(row, found.sequence, found.rhythm.every, found.judged.by)
+    _known(missed, found.since)
+    session.add(missed)
+    data = {
+        "by": missed.by,
+        "every": missed.every if missed.by == "parts" else None,
+        "minutes_planned": row.minutes if missed.by == "minutes" else None,
+        "parts": missed.parts,
+        "minutes": missed.minutes,
+        "after": missed.after,
+    }
+    alarm = alarms.raise_for_characteristic(session, row.machine_id, row.characteristic_id, None, MISSED, data)
+    publish(session, alarms.news(machine, alarm) | {"characteristic": characteristic})
+
+
+def _end(
+    session: Session, row: ControlPlan, machine: str, characteristic: str, *, by: str, comment: str, outcome: Any
+) -> None:
+    """End what is open, and its alarm; the machine is locked. Without any nothing happens."""
+    missed = queries.open_of(session, row)
+    if missed is not None:
+        missed.ended_at, missed.until = datetime.now(UTC), outcome.get("sequence")
+        session.flush()
+    ended = alarms.settle_for_characteristic(
+        session, row.machine_id, row.characteristic_id, MISSED, by, comment, outcome
+    )
+    if ended is not None:
+        publish(session, alarms.news(machine, ended) | {"characteristic": characteristic})

@@ -1,0 +1,39 @@
+"""Periodic job: looks at the control plans whose part was measured lately, one characteristic at a time."""
+
+from sqlalchemy import text
+from sqlalchemy.orm import Session
+
+from app.jobs.actions import PeriodicJob, Unit
+from app.loop.control_plan.actions import keep
+
+# Nothing can have been missed where neither this characteristic nor another one of its part had a reading since. After half a day
+# without any, the last look knew all.
+_DUE = text("""
+SELECT p.machine_id, p.characteristic_id, c.key
+FROM control_plan p
+JOIN characteristic c ON c.machine_id = p.machine_id AND c.id = p.characteristic_id
+JOIN stream s ON s.machine_id = p.machine_id AND s.characteristic_id = p.characteristic_id
+WHERE (p.every IS NOT NULL OR p.minutes IS NOT NULL OR p.per_shift OR p.after_change > 0 OR p.after_alarm > 0)
+AND (s.sequence > p.seen OR EXISTS (
+    SELECT FROM stream o JOIN characteristic b ON b.machine_id = o.machine_id AND b.id = o.characteristic_id
+    WHERE o.machine_id = p.machine_id AND b.id <> c.id AND b.part IS NOT DISTINCT FROM c.part
+    AND o.last_received_at > greatest(coalesce(s.last_received_at, p.since), p.since, now() - interval '12 hours')
+))
+ORDER BY p.machine_id, p.characteristic_id
+""")
+
+
+def due(session: Session) -> list[Unit]:
+    """Plans that may not have been kept."""
+    return [
+        Unit(f"characteristic/{key}", (machine_id, characteristic_id), machine_id, characteristic_id)
+        for machine_id, characteristic_id, key in session.execute(_DUE)
+    ]
+
+
+def look_at(session: Session, unit: Unit) -> None:
+    """Put on record what was missed at one characteristic, raise its alarm, or end it."""
+    keep(session, int(unit.key[0]), int(unit.key[1]))
+
+
+JOB = PeriodicJob("control_plans", due, look_at)

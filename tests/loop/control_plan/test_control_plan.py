@@ -1,0 +1,201 @@
+"""Control plans: what is due is said, what is missed is an alarm until the next reading, and is counted."""
+
+from datetime import UTC, datetime, timedelta
+from typing import Any
+
+import httpx
+import psycopg
+import pytest
+
+from app.jobs.actions import run_jobs
+from app.loop.control_plan import actions, jobs
+from tests.conftest import Server
+from tests.shop import Person, Shop
+
+WHY = "Agreed with quality"
+
+
+@pytest.fixture
+def other(shop: Shop) -> str:
+    """Another characteristic of the same part, which is measured at every part."""
+    return shop.another("face", tool_memory=7, average_memory=7)
+
+
+def plan(shop: Shop, status: int = 200, **rules: Any) -> Any:
+    return shop.call("PUT", f"/characteristics/{shop.characteristic}/control-plan", status, reason=WHY, **rules)
+
+
+def look(shop: Shop) -> list[dict[str, Any]]:
+    """Let the job run; the active alarms."""
+    run_jobs(shop.server.database, [jobs.JOB])
+    return shop.alarms()
+
+
+def due(shop: Shop) -> Any:
+    (item,) = shop.call("GET", f"/due-measurements?machine={shop.machine}")["items"]
+    return item
+
+
+def missed(shop: Shop) -> list[Any]:
+    items: list[Any] = shop.call("GET", f"/missed-measurements?characteristic={shop.characteristic}")["items"]
+    return items
+
+
+def cut(shop: Shop, other: str, *parts: str) -> None:
+    for part in parts:
+        shop.read(0.1, other, part=part)
+
+
+def test_a_part_too_many_is_an_alarm_that_the_next_reading_ends(shop: Shop, other: str) -> None:
+    cut(shop, other, "A1", "A2", "A3")
+    plan(shop, every=2)
+    shop.read(0.1, part="A4")
+    cut(shop, other, "A4", "A5")
+    assert (due(shop)["due"], due(shop)["next_in"], look(shop)) == ("later", 2, [])
+    cut(shop, other, "A6")
+    assert (due(shop)["due"], due(shop)["parts"], look(shop)) == ("due", 1, [])
+    cut(shop, other, "A7")
+    assert due(shop)["due"] == "missed"
+    (alarm,) = look(shop)
+    assert (alarm["kind"], alarm["characteristic"], alarm["count"]) == ("measurement_missed", shop.characteristic, 1)
+    assert "2 parts or more" in alarm["text"]
+    assert "1 in 2 parts" in alarm["text"]
+    cut(shop, other, "A8")
+    assert look(shop)[0]["count"] == 1, "once, however long it lasts"
+    shop.read(0.1, part="A9")
+    assert look(shop) == []
+    (ended,) = shop.alarms("acknowledged")
+    assert (ended["acknowledged_by"], ended["outcome"][0]["sequence"]) == ("inband", 2)
+    (one,) = missed(shop)
+    assert (one["by"], one["every"], one["after"], one["until"], one["parts"]) == ("parts", 2, 1, 2, 4)
+    assert (look(shop), len(missed(shop))) == ([], 1), "looked at again it changes nothing"
+
+
+def test_one_that_was_made_up_for_between_two_looks_is_counted_without_an_alarm(shop: Shop, other: str) -> None:
+    plan(shop, every=1)
+    shop.read(0.1, part="A1")
+    cut(shop, other, "A1", "A2", "A3")
+    shop.read(0.1, part="A3")
+    assert look(shop) == []
+    (one,) = missed(shop)
+    assert (one["after"], one["until"], one["parts"]) == (1, 2, 1)
+
+
+def test_acknowledging_does_not_raise_it_again(shop: Shop, other: str) -> None:
+    plan(shop, every=1)
+    cut(shop, other, "A1", "A2")
+    (alarm,) = look(shop)
+    shop.acknowledge(alarm["id"], "noted")
+    cut(shop, other, "A3")
+    assert look(shop) == []
+    shop.read(0.1, part="A4")
+    cut(shop, other, "A5", "A6")
+    assert len(look(shop)) == 1, "another one"
+    assert [one["parts"] for one in missed(shop)] == [1, 3]
+
+
+def test_every_part_after_an_alarm_and_after_a_tool_change(shop: Shop, other: str) -> None:
+    plan(shop, every=50, after_alarm=2, after_change=1)
+    shop.push([0.1, 0.1])
+    assert (due(shop)["every"], due(shop)["tightened"]) == (50, None)
+    shop.read(9.0)
+    assert (due(shop)["every"], due(shop)["tightened"]) == (1, "alarm")
+    cut(shop, other, "A1", "A2")
+    assert {alarm["kind"] for alarm in look(shop)} == {"oversize", "measurement_missed"}
+    shop.read(0.1)
+    assert (due(shop)["tightened"], due(shop)["due"]) == ("alarm", "due")
+    shop.read(0.1)
+    assert due(shop)["tightened"] is None, "its own alarm tightens nothing"
+    shop.call("POST", f"/machines/{shop.machine}/tools/3/change", offset=0.0, reason="worn")
+    assert due(shop)["tightened"] == "tool_change"
+    shop.read(0.1)
+    assert due(shop)["tightened"] is None
+
+
+def test_by_minutes_and_by_shift_while_the_part_is_made(shop: Shop, other: str) -> None:
+    plan(shop, minutes=20.0)
+    with psycopg.connect(shop.server.database.dsn) as connection:  # it holds since yesterday
+        connection.execute("UPDATE control_plan SET since = now() - interval '2 days'")
+    noon = datetime.now(UTC) - timedelta(hours=26)
+    shop.read(0.1, measured_at=noon.isoformat())
+    moments = [(noon + timedelta(minutes=10 * at)).isoformat() for at in (1, 2)]
+    shop.push([0.1, 0.1], other, measured_at=moments)
+    assert look(shop) == []
+    shop.read(0.1, other, measured_at=(noon + timedelta(minutes=30)).isoformat())
+    (alarm,) = look(shop)
+    assert "30 min" in alarm["text"]
+    plan(shop, per_shift=True)
+    assert look(shop) == [], "another plan ends it"
+    assert missed(shop)[0]["until"] is None
+    with psycopg.connect(shop.server.database.dsn) as connection:
+        connection.execute("UPDATE control_plan SET since = now() - interval '2 days'")
+    shop.read(0.1, other, measured_at=(noon + timedelta(hours=9)).isoformat())  # at least one shift on, and over
+    assert "shift" in look(shop)[0]["text"]
+
+
+def test_of_parts_that_nothing_tells_of_none_is_missed(shop: Shop, other: str) -> None:
+    plan(shop, every=1)
+    shop.push([0.1] * 3)
+    assert (due(shop)["due"], due(shop)["parts"], look(shop)) == ("due", None, [])
+    assert "not known" in due(shop)["text"]
+    shop.call("PATCH", f"/characteristics/{other}", part="another part")
+    cut(shop, other, "B1", "B2", "B3")
+    assert look(shop) == [], "the machine makes another part now"
+
+
+def test_one_that_fails_stops_no_other(shop: Shop, other: str, server: Server, monkeypatch: pytest.MonkeyPatch) -> None:
+    plan(shop, every=1)
+    neighbour = Shop(server)
+    plan(neighbour, every=1)
+    cut(neighbour, neighbour.another("face"), "A1", "A2")
+    cut(shop, other, "A1", "A2")
+
+    def fails(session: Any, machine_id: int, characteristic_id: int) -> None:
+        actions.keep(session, machine_id, characteristic_id)
+        if failing == (machine_id, characteristic_id):
+            raise RuntimeError("torn cable")
+
+    with server.database.sessions() as session:
+        failing = next(
+            unit.key for unit in jobs.due(session) if unit.subject == f"characteristic/{shop.characteristic}"
+        )
+    monkeypatch.setattr(jobs, "keep", fails)
+    assert look(shop) == []
+    assert [alarm["kind"] for alarm in neighbour.alarms()] == ["measurement_missed"]
+
+
+def test_a_plan_is_set_by_engineers_on_record_and_not_over_a_newer_one(shop: Shop, server: Server) -> None:
+    here = f"/characteristics/{shop.characteristic}/control-plan"
+    assert shop.call("GET", here)["text"] == "No control plan"
+    engineer, operator = (server.client(server.key(role)) for role in ("engineer", "operator"))
+    shop.call("PUT", here, 403, client=operator, every=5, reason=WHY)
+    for wrong in ({"every": 0}, {"minutes": -1.0}, {"after_alarm": 1001}, {"often": 3}):
+        assert plan(shop, 422, **wrong)["errors"][0]["field"] == next(iter(wrong))
+
+    def put(every: int, tag: str) -> httpx.Response:
+        return engineer.put(f"/api/v1{here}", json={"every": every, "reason": WHY}, headers={"If-Match": tag})
+
+    seen = engineer.get(f"/api/v1{here}").headers["ETag"]
+    assert [put(5, seen).status_code, put(6, seen).status_code] == [200, 412]
+    assert shop.call("GET", here)["every"] == 5
+    (entry,) = shop.call("GET", f"/audit?subject=characteristic/{shop.characteristic}&limit=1")["items"]
+    assert (entry["action"], entry["after"]) == ("control plan set", {"every": 5})
+    plan(shop)
+    assert shop.call("GET", f"/due-measurements?machine={shop.machine}")["items"] == []
+
+
+def test_its_page(shop: Shop, other: str, server: Server) -> None:
+    here = f"/characteristics/{shop.characteristic}/control-plan"
+    engineer = Person(server, "engineer")
+    assert "no measurement is missed" in engineer.open(here)
+    assert "Engineers set the plan" in Person(server, "operator").open(here)
+    engineer.send(here, 422, every="many", reason=WHY)
+    engineer.send(here, 422, every="5", reason="")
+    assert "The control plan is set" in engineer.send(here, every="1", after_change="3", per_shift="true", reason=WHY)
+    cut(shop, other, "A1", "A2")
+    look(shop)
+    page = engineer.open(here)
+    assert "Measurement missed" in page
+    assert "not yet" in page
+    assert "each of the first 3 parts after a tool change" in page
+    assert f'href="{here}"' in engineer.open(f"/characteristics/{shop.characteristic}")
