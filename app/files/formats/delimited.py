@@ -3,10 +3,11 @@
 import codecs
 import csv
 import re
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 from typing import NamedTuple, TextIO
 
+from app.files.formats import dimension_blocks
 from app.language.i18n import _
 
 DELIMITERS = (";", "\t", ",", "|")
@@ -26,6 +27,7 @@ ENCODINGS = (
 )
 END = "END"  # alone in a row: so CALYPSO closes its tables
 SAMPLE = 64 * 1024
+AT_ONCE = 30  # lines that are compared
 LOOKED_AT = 1_000_000  # bytes from which an encoding is guessed
 _SIGNS_OF_ALL = "°±µ²³×·–—„“”‚‘’…€§«»\N{NO-BREAK SPACE}"
 _LATIN = "äöüÄÖÜß" + _SIGNS_OF_ALL
@@ -105,31 +107,54 @@ def open_text(path: Path, encoding: str) -> TextIO:
 
 def delimiter_of(path: Path, encoding: str) -> str:
     """The sign that parts the cells of the first lines most evenly; a comma when none does."""
-    with open_text(path, encoding) as file:
-        try:
-            sample = file.read(SAMPLE)
-        except UnicodeError:
-            raise Unusable(_not_text(encoding)) from None
+    sample = _beginning(path, encoding)
     if announced := re.match(r"sep=(.)\r?\n", sample):  # spreadsheets write this
         return announced[1]
     unquoted = re.sub(r'"(?:[^"]|"")*"', "", sample)
     lines = [line for line in unquoted.splitlines() if line.strip()]
-    lines = ([line for line in lines if not line.lstrip().startswith("#")] or lines)[:30]
+    lines = [line for line in lines if not line.lstrip().startswith("#")] or lines
     if len(sample) == SAMPLE and len(lines) > 1:
         lines = lines[:-1]  # cut off in the middle, perhaps
+    first = None
+    for begin in range(0, len(lines), AT_ONCE):  # a long preamble above the table has no values between them
+        some = lines[begin : begin + AT_ONCE]
+        best = _evenest(some)
+        if best and any(is_value(cell) for line in some for cell in line.split(best)[1:]):
+            return best
+        first = first or best
+    if first:
+        return first
+    best = max(DELIMITERS, key=lines[0].count) if lines else ","
+    return best if lines and best in lines[0] else ","
+
+
+def _evenest(lines: Sequence[str]) -> str | None:
     for first in range(len(lines)):  # titles above the table have none of them
         evenness = {sign: min(line.count(sign) for line in lines[first:]) for sign in DELIMITERS}
         best = max(DELIMITERS, key=lambda sign: evenness[sign])
         if evenness[best]:
             return best
-    best = max(DELIMITERS, key=lines[0].count) if lines else ","
-    return best if lines and best in lines[0] else ","
+    return None
+
+
+def _beginning(path: Path, encoding: str) -> str:
+    with open_text(path, encoding) as file:
+        try:
+            return file.read(SAMPLE)
+        except UnicodeError:
+            raise Unusable(_not_text(encoding)) from None
 
 
 def rows(path: Path, encoding: str, delimiter: str) -> Iterator[Row]:
     """Every row that is not empty, the header first; comments (`#`) above it are passed over. Raises `Unusable` where it
-    cannot go on.
+    cannot go on. The blocks of a report are one table.
     """
+    if dimension_blocks.is_report(_beginning(path, encoding)):
+        with open_text(path, encoding) as file:
+            columns = dimension_blocks.columns_of(_decoded(file, encoding))
+        with open_text(path, encoding) as file:
+            yield from (Row(*row) for row in dimension_blocks.table(_decoded(file, encoding), columns))
+        return
     every = _rows(path, encoding, delimiter)
     comment: Row | None = None
     for row in every:

@@ -8,7 +8,7 @@ from app.files.formats import delimited
 from app.files.formats.delimited import Row
 from app.files.formats.units import is_unit_column, length_unit
 
-TOP = 50  # rows in which the heading is looked for
+TOP = 500  # rows in which the heading is looked for
 OTHER_UNITS = {
     "",
     "-",
@@ -77,7 +77,7 @@ def heading(top: Sequence[Row], said: int | None = None, *, ragged: bool = False
 
 
 def as_wide(row: Row, width: int) -> Row:
-    """A row with so many cells: cut off, or filled up with empty ones."""
+    """A row with `width` cells: cut off, or filled up with empty ones."""
     return row._replace(cells=row.cells[:width] + [""] * (width - len(row.cells)))
 
 

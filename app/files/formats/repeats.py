@@ -13,9 +13,10 @@ MOST = 200  # different ones
 def lines_of(first: Sequence[int], count: int | None = None) -> str:
     """The lines of something, of which the first are named; count: of all, where `first` are not all.
 
-    >>> lines_of([4]), lines_of([4, 9]), lines_of([4, 9, 12, 13], 30)
-    ('line 4', 'lines 4, 9', 'lines 4, 9, 12 and 27 more')
+    >>> lines_of([4]), lines_of([4, 9]), lines_of([4, 4]), lines_of([4, 9, 12, 13], 30)
+    ('line 4', 'lines 4, 9', 'line 4', 'lines 4, 9, 12 and 27 more')
     """
+    first = list(dict.fromkeys(first))
     count = len(first) if count is None else count
     if count == 1:
         return _("line {line}").format(line=first[0])
@@ -29,7 +30,7 @@ def lines_of(first: Sequence[int], count: int | None = None) -> str:
 class _Same:
     first: Remark
     lines: list[int]
-    count: int = 1
+    count: int = 1  # of lines
 
 
 @dataclass
@@ -46,9 +47,13 @@ class Repeats:
             if len(self._found) < MOST:
                 self._found[name] = _Same(remark, [remark.line])
             return
+        if remark.line in same.lines:
+            return
         same.count += 1
         if len(same.lines) <= FIRST:
             same.lines.append(remark.line)
+        else:
+            same.lines[-1] = remark.line
 
     def sentences(self) -> list[str]:
         """Each with its lines, its field and the first value."""

@@ -158,6 +158,8 @@ class Summary:
     first_sequence: int | None = None
     last_sequence: int | None = None
     passed: dict[str, list[int]] = field(default_factory=dict)
+    has_form: bool = False  # among the results of its touches
+    without_form: list[str] = field(default_factory=list)  # characteristics of form that get no readings of it
 
     @property
     def notes(self) -> list[str]:
@@ -169,6 +171,12 @@ class Summary:
         if 0 < self.untimed_count < self.lines:
             named = lines_of(self.untimed, self.untimed_count)
             texts.append(_("{lines}: no time; it is that of the line above.").format(lines=named))
+        if self.has_form and self.without_form:
+            words = _(
+                "Form is stored with each reading as a result of its touches; the characteristics of form ({keys}) get no readings "
+                "from an imported file."
+            )
+            texts.append(words.format(keys=", ".join(self.without_form)))
         return texts
 
 
@@ -248,6 +256,7 @@ def store_history(
         now = characteristics.characteristic_named(session, entry.characteristic)
         _refuse_change(current, now)
         _refuse_new_empirical_value(judge.empirical_value, _empirical_value(session, now))
+        summary.without_form = [form.characteristic.key for form in characteristics.forms(session, now.characteristic)]
         _move_over(cursor, entry, current.version.version, judge.now, summary)
         cursor.execute("DROP TABLE staged")  # a wide sheet stages one characteristic after the other
     if summary.stored:
@@ -296,6 +305,7 @@ def _stage(cursor: Cursor[Any], lines: Iterable[Line | Flaw | Passed], judge: _J
                 continue
             copy.write_row(row)
             _count(summary, row)
+            summary.has_form = summary.has_form or row[11] is not None
             if isinstance(line, Line) and line.reading.measured_at is None:
                 summary.untimed_count += 1
                 summary.untimed += [line.number] if len(summary.untimed) < NAMED_LINES else []

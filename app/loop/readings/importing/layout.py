@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 from zoneinfo import ZoneInfo
 
 from app.errors import FieldError, Invalid
-from app.files.formats import cell_values, delimited, spreadsheet
+from app.files.formats import cell_values, delimited, parts_across, spreadsheet
 from app.files.formats.cell_values import slashed
 from app.files.formats.column_names import NAMES
 from app.files.formats.delimited import Row, Unusable
@@ -89,6 +89,7 @@ class Layout:
         default_factory=dict
     )  # where each row says of which characteristic it is, by name
     only: str = ""  # the one of them that is read
+    parts: tuple[str, ...] = ()  # columns that are parts, where each row is a characteristic
     skips_blank: bool = False  # a row without the measured value says nothing: another column of a wide sheet has one
 
     @property
@@ -110,6 +111,11 @@ class Layout:
     def complete(self) -> bool:
         """Tell if the column of the measured values is known."""
         return "measured" in self.columns or "touches" in self.columns
+
+    @property
+    def turned(self) -> str:
+        """A sentence on a table that is the other way round: characteristics downward, parts across. Empty for any other."""
+        return "" if self.complete or not self.parts else parts_across.sentence(self.parts)
 
     @property
     def subjects(self) -> tuple[str, ...]:
@@ -190,7 +196,8 @@ def refuse_incomplete(layout: Layout) -> None:
     if not layout.complete:
         raise wrong(
             "measured",
-            _(
+            layout.turned
+            or _(
                 "No column is recognised as the measured value. Say which it is: measured=COLUMN. The columns are: {header}."
             ).format(header=", ".join(filter(None, layout.header))),
         )
@@ -276,6 +283,7 @@ def _csv_layout(path: Path, wishes: Wishes, zone: ZoneInfo | None, kind: str = "
         first_line=first_line,
         last_line=wishes.last_line,
         missing=wishes.missing,
+        parts=() if "measured" in columns else parts_across.columns(header, _guesses(header), below),
     )
     named = (
         (row.line, row.cells) for row in rows_of(path, made) if isinstance(row, Row) and tuple(row.cells) != header

@@ -191,8 +191,13 @@ def test_touches_are_kept_and_checked(plant: Database, tmp_path: Path) -> None:
         run(plant, path)
     assert [(f.line, f.column) for f in refusal.value.flaws] == [(2, "touches")]
     path.write_text(json.dumps(good) + "\n")
-    run(plant, path)
-    assert stored(plant)[0]["measured"] == 39.99805
+    with plant.begin() as session:
+        of = {"form_of": {"characteristic": "shaft-d40", "result": "run_out"}, "parameters": {"R40": 0.01}}
+        form = CharacteristicIn.model_validate({"key": "d40-run-out", "name": "Run-out", "machine": "lathe-1"} | of)
+        characteristics.add_characteristic(session, form, "tests")
+    [note] = run(plant, path).notes
+    assert "the characteristics of form (d40-run-out) get no readings" in note
+    assert [row["measured"] for row in stored(plant)] == [39.99805], "of the diameter alone"
     assert scalar(plant, "SELECT touches FROM reading_touches") == good["touches"]
     with plant.begin() as session:  # sides 39.9981 and 39.9980; of the repeats 0.2 µm each: sqrt((2 + 2) / 2) * 0.1 µm
         found = session.execute(

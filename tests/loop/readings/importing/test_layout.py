@@ -2,6 +2,7 @@
 
 import json
 import re
+from dataclasses import replace
 from datetime import UTC, datetime
 from pathlib import Path
 
@@ -11,7 +12,9 @@ from openpyxl import Workbook
 from app.errors import Invalid
 from app.files.formats.delimited import BLANKS
 from app.files.formats.spreadsheet import text_of
+from app.loop.readings.importing.aqdef.matching import parameters_of
 from app.loop.readings.importing.cells import Flaw, Passed
+from app.loop.readings.importing.drawn import contents
 from app.loop.readings.importing.layout import MOST_COLUMNS, NO_DIGIT, Wishes, look
 from app.loop.readings.importing.lines import Line, lines
 
@@ -347,3 +350,100 @@ def test_a_text_among_the_numbers_of_a_workbook_is_read_in_the_one_way_it_can_be
         found = list(lines(path, look(path, Wishes(), "a.xlsx"), "shaft-d40", now=NOW))
     assert [each.reading.measured for each in found if isinstance(each, Line)] == [40.001, 40.002]
     assert [each.line for each in found if isinstance(each, Flaw)] == [4]
+
+
+REPORT = """\
+PART NAME  : HOUSING
+REV NUMBER : B
+SER NUMBER : {serial}
+STATS COUNT: 1
+
+DIM LOC1= LOCATION OF CIRCLE CIR1  UNITS={unit} ,$
+GRAPH=OFF  TEXT=OFF  MULT=10.00  OUTPUT=BOTH
+AX    NOMINAL       +TOL       -TOL       MEAS        DEV     OUTTOL
+X      25.000      0.050      0.050     25.012      0.012      0.000 ----#----
+D      10.000      0.030      0.010     {size}      0.004      0.000 ----#----
+A      90.000      1.000      1.000     90.200      0.200      0.000
+END OF DIMENSION LOC1
+
+DIM LOC2= POSITION OF CIRCLE CIR2  UNITS={unit}
+AX       MEAS    NOMINAL       +TOL       -TOL      BONUS        DEV     OUTTOL
+X     -28.623    -28.600                                      -0.023
+TP      0.068        MMC      0.200                 0.054      0.068      0.000
+"""
+
+
+def of_report(tmp_path: Path, text: str) -> dict[str, list[tuple[int, float | None, str | None] | str]]:
+    """Lines, sizes and parts of each of its characteristics, or the reason for which one cannot be read."""
+    path = write(tmp_path, text, name="report.txt")
+    layout = look(path, Wishes())
+    return {
+        name: [
+            (each.number, each.reading.measured, each.reading.part) if isinstance(each, Line) else str(each)
+            for each in lines(path, replace(layout, only=name), "c", now=NOW)
+            if not (isinstance(each, Passed) and "not chosen" in each.reason)
+        ]
+        for name in layout.names
+    }
+
+
+def test_the_blocks_of_a_report_are_one_table(tmp_path: Path) -> None:
+    two = REPORT.format(serial=12, size="10.004", unit="MM") + REPORT.format(serial=13, size="10.005", unit="MM")
+    found = of_report(tmp_path, two)
+    assert list(found) == ["LOC1 X", "LOC1 D", "LOC1 A", "LOC2 X", "LOC2 TP"]
+    assert found["LOC1 D"] == [(10, 10.004, "12"), (27, 10.005, "13")]
+    assert found["LOC2 X"] == [(16, -28.623, "12"), (33, -28.623, "13")]
+    assert found["LOC2 TP"] == [(17, 0.068, "12"), (34, 0.068, "13")]
+    assert "names the unit 'deg'" in str(found["LOC1 A"]), "an angle is no length"
+    [d] = [each for each in contents(look(tmp_path / "report.txt", Wishes())) if each.title.endswith("LOC1 D")]
+    assert [parameters_of(d)[name] for name in ("nominal", "upper_deviation", "lower_deviation")] == [10, 0.03, -0.01]
+    assert of_report(tmp_path, REPORT.format(serial=1, size="10.004", unit="IN"))["LOC2 TP"] == [(17, 1.7272, "1")]
+
+
+def test_a_row_of_a_report_that_is_cut_or_moved_is_refused_by_line(tmp_path: Path) -> None:
+    cut = of_report(tmp_path, REPORT.format(serial=1, size="10.004", unit="MM").partition("0.068")[0] + "0.06")
+    assert cut["LOC2 TP"] == ["line 17, MEAS: '0.06 ?' is not a number; write it like 39.9981, without a unit"]
+    moved = REPORT.format(serial=1, size="10.004", unit="MM").replace(
+        "X     -28.623    -28.600", "X   -28.623  -28.600"
+    )
+    assert of_report(tmp_path, moved)["LOC2 X"] == [
+        "line 16, MEAS: '-28.623 -28.600 -0.023 ?' is not a number; write it like 39.9981, without a unit"
+    ]
+
+
+def test_a_heading_may_be_far_below_the_beginning(tmp_path: Path) -> None:
+    preamble = "".join(f"Remark {at}: the parts of this week, as they came\n" for at in range(120))
+    path = write(tmp_path, f"{preamble}Part;Measured [mm];Time\na;39,998;18.11.2025 06:05\nb;39,997;18.11.2025 06:06\n")
+    assert good(path, timezone="UTC") == [(39.998, "a"), (39.997, "b")]
+    assert look(path, Wishes(timezone="UTC")).header_line == 121
+
+
+@pytest.mark.parametrize(
+    ("text", "parts"),
+    [
+        (
+            "Merkmal;Soll;OGW;UGW;Teil 7;Teil 8\nD40;40;40,1;39,9;40,01;40,02\nD35;35;35,1;34,9;35,01;\n",
+            "Teil 7, Teil 8",
+        ),
+        ("Dim,Nominal,P1,P2,P3,P4\nD40,40,40.01,40.02,40.01,40.02\n", "P1, P2, P3, …"),
+        ("\t1\t2\t3\nD40\t40.01\t40.02\t40.03\n", "1, 2, 3"),
+    ],
+)
+def test_a_table_with_parts_across_says_how_to_turn_it_round(tmp_path: Path, text: str, parts: str) -> None:
+    path = write(tmp_path, text)
+    first = parts.partition(",")[0]
+    with pytest.raises(Invalid) as refusal:
+        look(path, Wishes())
+    assert f"Each row is a characteristic and each of the columns {parts} a part" in refusal.value.detail
+    assert f"measured={first}" in refusal.value.detail
+    layout = look(path, Wishes(mapping={"measured": first}))
+    assert layout.turned == ""
+    name = layout.names[0] if layout.names else ""
+    found = [each for each in lines(path, replace(layout, only=name), "c", now=NOW) if isinstance(each, Line)]
+    assert found[0].reading.measured == 40.01, "what the sentence names works"
+
+
+@pytest.mark.parametrize("text", ["Höhe;Breite\n1;2\n", "Part;D40;D41\nP1;40.01;41.02\n", "Zeit;A\n18.11.2025;1\n"])
+def test_other_tables_without_a_measured_column_are_no_turned_ones(tmp_path: Path, text: str) -> None:
+    with pytest.raises(Invalid, match="No column is recognised as the measured value"):
+        look(write(tmp_path, text), Wishes())
