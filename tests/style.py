@@ -17,10 +17,11 @@ LONGEST_FILE = 519
 QUESTIONS = {"What", "Whether", "How", "Which", "Who", "Whose", "Where", "When", "Why"}
 WIDEST_TEMPLATE = 160  # columns
 NOT_SAID = re.compile(
-    r"\b(told(?![:(),]| IS| -)|mend(?:s|ed|ing)?|anew(?!:)|whoever|nobody has said|(?:is|are|was|were|be) away)\b",
+    r"\b(told(?![:(),]| IS| -)|mend(?:s|ed|ing)?|anew|whoever|so many(?! that)|nobody has said|(?:is|are|was|were|be) away)\b",
     re.IGNORECASE,
 )
-"""Say reported, found or informed; fix; again; the user or anyone who; not entered; unreachable."""
+"""Say reported, found or informed; fix; again; the user or anyone who; the number or N; not entered; unreachable."""
+NOT_NAMED = {"anew", "mended", "whoever"}
 CODE = re.compile(
     r"``.*?``|`[^`]*`|\]\([^)]*\)|^ *>>>.*$|\b(?:SELECT|UPDATE|INSERT|CREATE TABLE|DELETE FROM)\b.*",
     re.DOTALL | re.MULTILINE,
@@ -56,7 +57,7 @@ def main() -> int:
         for node in ast.walk(ast.parse(text)):
             if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef | ast.ClassDef | ast.Module):
                 words = (ast.get_docstring(node) or "-").split()
-                if words[0].rstrip(".,:'s") in QUESTIONS or words[0] in QUESTIONS:
+                if words[0].rstrip(".,:'s") in QUESTIONS or words[0].startswith("How-"):
                     place = f"{path.relative_to(APP.parent)}:{getattr(node, 'lineno', 1)}"
                     sys.stderr.write(
                         f"{place}: a summary is no question ({words[0]} …): name the thing, or say what it does.\n"
@@ -65,7 +66,7 @@ def main() -> int:
     for place in hidden_sentences(files):
         sys.stderr.write(f"{place}: pybabel does not see a sentence inside an f-string: put it beside.\n")
         status = 1
-    for place, word in sorted(words_not_said(files)):
+    for place, word in sorted([*words_not_said(files), *names_not_given(files)]):
         sys.stderr.write(f"{place}: “{word}” is not said here; see NOT_SAID in tests/style.py.\n")
         status = 1
     for template in TEMPLATES.rglob("*.html"):
@@ -106,6 +107,16 @@ def words_not_said(files: dict[Path, str]) -> Iterator[tuple[str, str]]:
         yield from _found(path, [(text.count("\n", 0, at.start()) + 1, at[1]) for at in SENTENCE.finditer(text)])
     for path in (*DOCS.rglob("*.md"), *DOCS.parent.glob("*.md")):
         yield from _found(path, [(1, re.sub(r"```.*?```", "", path.read_text(encoding="utf-8"), flags=re.DOTALL))])
+
+
+def names_not_given(files: dict[Path, str]) -> Iterator[tuple[str, str]]:
+    """Names of functions, arguments and variables of the program, and of tests, with words that are not ours."""
+    tests = {path: path.read_text(encoding="utf-8") for path in Path(__file__).parent.rglob("test_*.py")}
+    for path, text in (files | tests).items():
+        named = r"\bdef (test_\w+)" if path in tests else r"\b(\w+)(?==| =|\()|def (\w+)"
+        for at in re.finditer(named, text):
+            if not NOT_NAMED.isdisjoint(at[0].split("_")):
+                yield f"{path.relative_to(APP.parent)}:{text.count(chr(10), 0, at.start()) + 1}", at[0]
 
 
 def _found(path: Path, texts: Iterable[tuple[int, str]]) -> Iterator[tuple[str, str]]:

@@ -252,7 +252,7 @@ def time_axis(moments: Sequence[datetime] = (), *, hidden: bool = False) -> Axis
 
 
 def reading_axis(reach: tuple[float, float], width: int) -> Axis:
-    """An axis of the numbers of readings, in a chart so many pixels wide."""
+    """An axis of the numbers of readings, in a chart N pixels wide."""
     return Axis(_("Reading number"), reach=reach, format="d", ticks=8 if width > 900 else 5, grid=False)
 
 

@@ -36,7 +36,7 @@ WHITE = "#ffffff"
 
 
 def to_drawing(chart: Chart, width: float, height: float) -> Drawing:
-    """The chart, drawn into so many pixels."""
+    """The chart, drawn into N pixels."""
     return _Paper(chart, width, height).drawn()
 
 

@@ -55,7 +55,7 @@ HALVED, DOUBLED = 0.75, 1.5  # nearer to 1/2 or to 2 than to 1
 class Effect(NamedTuple):
     """The share of a correction that arrives, with its confidence interval.
 
-    corrections: changes of the offset that it is found by, among so many readings; typical: the median change of size that they
+    corrections: changes of the offset that it is found by, among the readings; typical: the median change of size that they
     commanded, mm. scatter: standard deviation of a part about the course of the process, mm.
     """
 
@@ -116,7 +116,7 @@ class GainVerdict(StrEnum):
 
 
 class Gain(NamedTuple):
-    """Gain of corrections, 1 where they act in full, with its 95 % interval, from so many changes of the offset and readings."""
+    """Gain of corrections, 1 where they act in full, with its 95 % interval, from the numbers of changes of the offset and of readings."""
 
     value: float
     low: float

@@ -83,7 +83,7 @@ def forecast(fit: Fit, limit: float, widening: float = PUBLIC_WIDENING) -> Forec
 
 
 def cone(fit: Fit, ahead: Values, widening: float = PUBLIC_WIDENING) -> tuple[Values, Values]:
-    """Limits of the size of a part so many parts after the last, mm: with the slowest and with the fastest wear.
+    """Limits of the size of a part N parts after the last, mm: with the slowest and with the fastest wear.
 
     The same interval as that of `forecast`, seen from the parts: it comes to a limit after `low` and after `high` parts.
 
@@ -141,7 +141,7 @@ def taught(needed: Sequence[float]) -> float:
 
 
 def widening_after(lives: int, taught: float) -> float:
-    """The exponent for the next edge, after so many lives that taught this one.
+    """The exponent for the next edge, after N lives that taught this one.
 
     >>> widening_after(0, 0.0), widening_after(2, 1.9), widening_after(ENOUGH, 0.8), widening_after(9, 0.0)
     (1.4, 1.9, 0.8, 0.5)
@@ -181,7 +181,7 @@ def _seen(fit: Fit) -> int:
 
 
 def _steep(fit: Fit, parts: float) -> float:
-    """By how many times wear that ends steeply may be faster than the line, so many parts ahead."""
+    """By how many times wear that ends steeply may be faster than the line, N parts ahead."""
     return STEEP * (1 + parts / (parts + _seen(fit)))
 
 

@@ -36,7 +36,7 @@ LEVEL_STEP = 0.1  # variance of a step of the level over that of the scatter
 # Parts before the first correction that show how the size wears or warms up; the sum of squares that a slope of none is worth.
 TREND, SHRUNK = 17, 60.0
 OPPOSITE = -0.2  # the gain is below this: with wear, that of corrections that do nothing is a little below 0
-# Standard errors that the gain is below 0, the same where both ask for more than so many times the scatter, and below half.
+# Standard errors that the gain is below 0, the same where both ask for more than this many times the scatter, and below half.
 SURE_OPPOSITE, LARGE, SURE_OF_LARGE, SURE_NOT_WEAK = 3.0, 2.5, 2.0, 4.0
 LARGEST_ERROR = 0.27  # of the gain
 LEAST = 1.5  # times the scatter that each of the two asks for: smaller ones say nothing
@@ -44,7 +44,7 @@ NOT_DONE, FARTHEST = 0.4, -3.5  # the gain of each of the two alone: beyond, som
 # And that of the second, the larger one where a sign is wrong: an edge that wears off quickly only seems to undo it.
 AGAIN = -0.1
 SURE_FIRST, SURE_SECOND = 1.9, 3.0  # standard errors that they are below 1, and below half
-# Until so many parts have shown the scatter, the first correction is so many times what it seems to be, and the gain below this.
+# Until this many parts have shown the scatter, the first correction is this many times what it seems to be, and the gain below this.
 KNOWN, FRESH, FRESH_OPPOSITE = 20, 8.0, -0.3
 # Standard deviations of a step between two parts of one correction: the process moved by itself, as where an edge breaks.
 ITSELF = 4.0

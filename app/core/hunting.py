@@ -181,7 +181,7 @@ def judge(sizes: Sequence[float], readings: int, scatter: float, settings: Setti
 
 
 def _at_least(count: int, mean: float) -> float:
-    """The probability of so many or more, of a negative binomial with this mean and `DISPERSION` times its variance.
+    """The probability of N or more, of a negative binomial with this mean and `DISPERSION` times its variance.
 
     With n = mean / (`DISPERSION` - 1) and p = 1 / `DISPERSION` it is the incomplete beta function I(1 - p; count, n).
     """

@@ -1,6 +1,6 @@
 """Notifications of active alarms, to whom and when: routes, quiet hours, repetition, escalation, one message in place of a flood.
 
-A route names the alarms it is for and steps of receivers. A step begins so many minutes after the alarm, or at once where
+A route names the alarms it is for and steps of receivers. A step begins some minutes after the alarm, or at once where
 nobody of the steps before it can be reached. A receiver gets at most one message in `GAP`, with everything that is due then.
 """
 
@@ -207,7 +207,7 @@ def _may_have_one(receiver: Receiver, now: datetime) -> bool:
 
 
 def pause_after(failures: int) -> timedelta:
-    """Time before the next try after so many failures in a row, at least one.
+    """Time before the next try after N failures in a row, at least one.
 
     >>> [pause_after(failures).total_seconds() for failures in (1, 2, 3, 99)]
     [10.0, 20.0, 40.0, 600.0]

@@ -106,7 +106,7 @@ def outlier(differences: Sequence[float], significance: float = 0.05) -> int | N
 
 
 def grubbs_limit(count: int, significance: float = 0.05) -> float:
-    """The two-sided critical value of Grubbs' test for so many values.
+    """The two-sided critical value of Grubbs' test for N values.
 
     >>> round(grubbs_limit(8), 3)
     2.127

@@ -357,7 +357,7 @@ def _accept(accept: Any, problems: list[Problem]) -> tuple[int, int]:
 
 
 def _sections(values: Mapping[str, Any]) -> Iterator[Problem]:
-    """Acceptance n of m needs m sections: R23 says so many points (twice as many for two points each), or nothing."""
+    """Acceptance n of m needs m sections: R23 says that many points (twice as many for two points each), or nothing."""
     sections, points = values["accept_m"], values["points"]
     two_point = values["variant"] == Variant.TWO_POINT
     if sections > 1 and points not in ({1, 2, sections, 2 * sections} if two_point else {1, sections}):

@@ -9,7 +9,7 @@ from app.core.parameters import Parameters
 from app.core.replay import Figures
 
 NEAR = 0.05  # so much worse than the best is as good as the best
-SIGMAS = 2.0  # and so many standard errors
+SIGMAS = 2.0  # and this many standard errors
 
 
 class Criterion(StrEnum):

@@ -99,11 +99,11 @@ class Fit:
         return self.slope != 0 and (low > 0 or high < 0)
 
     def at(self, ahead: float) -> float:
-        """The w of the part that comes so many parts after the last."""
+        """The w of the part that comes N parts after the last."""
         return self.level + self.slope * ahead
 
     def half_width(self, ahead: float, *, single: bool = False) -> float:
-        """Half the confidence interval of the line so many parts after the last; of a single part, with its scatter."""
+        """Half the confidence interval of the line N parts after the last; of a single part, with its scatter."""
         inflation = self.count / self.effective
         line = inflation * (1 / self.count + (ahead - self.centre) ** 2 / self.spread)
         return self.quantile * self.scatter * sqrt(line + (1.0 if single else 0.0))

@@ -125,7 +125,7 @@ def _reason(code: int, limits: Limits) -> str:
 
 
 def spend(size: int) -> None:
-    """Say that so many bytes are written. Beyond the limit of this process it raises `OSError`."""
+    """Say that N bytes are written. Beyond the limit of this process it raises `OSError`."""
     global _room  # noqa: PLW0603 - of the process, as the limits are
     if _room is not None:
         _room -= size

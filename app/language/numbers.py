@@ -36,7 +36,7 @@ def signed(value: float | None, decimals: int = 1) -> str:
 
 
 def fixed(value: float | None, decimals: int) -> str:
-    """A number with so many decimals, and a sign only where it is negative.
+    """A number with N decimals, and a sign only where it is negative.
 
     >>> fixed(-6.096, 2), fixed(-0.0001, 2), fixed(None, 2)
     ('−6.10', '0.00', '–')
@@ -47,7 +47,7 @@ def fixed(value: float | None, decimals: int) -> str:
 
 
 def decimals_beside(value: float, decimals: int, *limits: float) -> int:
-    """So many decimals that the rounded value lies on the same side of each limit as the value: as few as can be, seven more at most."""
+    """The number of decimals with which the rounded value lies on the same side of each limit as the value: as few as can be, seven more at most."""
     for more in range(decimals, decimals + MOST_MORE):
         rounded = round(value, more)
         if all((rounded > limit) - (rounded < limit) == (value > limit) - (value < limit) for limit in limits):

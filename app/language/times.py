@@ -81,7 +81,7 @@ def local(at: datetime) -> datetime:
 
 
 def begin_of_day(at: datetime, days: int = 0) -> datetime:
-    """Midnight at the plant, so many days after that of the moment."""
+    """Midnight at the plant, N days after that of the moment."""
     return datetime.combine(local(at).date() + timedelta(days), time(), plant_zone())
 
 

@@ -37,7 +37,7 @@ def demo(
             envvar="INBAND_PAST",
             min=0.1,
             max=120,
-            help="So many days of past at the first start, one shift a day: 42 for six weeks. Else some hours.",
+            help="Days of past at the first start, one shift a day: 42 for six weeks. Else some hours.",
         ),
     ] = None,
     bridge: Annotated[

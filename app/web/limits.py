@@ -24,7 +24,7 @@ By = Literal["anybody", "caller", "viewer", "operator", "engineer", "admin"]
 
 
 class Takes(NamedTuple):
-    """Body that a route takes: at most so many bytes. by: the least role of those who may send more than `DEFAULT`."""
+    """Body that a route takes: at most N bytes. by: the least role of those who may send more than `DEFAULT`."""
 
     most: int
     by: By

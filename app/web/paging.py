@@ -75,6 +75,6 @@ def holds(text: str, *places: str | None) -> bool:
 
 
 def slice_of(rows: Sequence[Row], limit: int, after: int, link: Callable[..., str]) -> Part[Row]:
-    """At most `limit` of all the rows, those that come after so many."""
+    """At most `limit` of all the rows, those that come after the first `after`."""
     on = link(after=after + limit) if after + limit < len(rows) else None
     return Part(list(rows[after : after + limit]), on, link(after=max(after - limit, 0) or None) if after else None)

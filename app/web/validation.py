@@ -80,7 +80,7 @@ def message(error: Mapping[str, Any]) -> str:
     if kind in {"enum", "literal_error"}:
         return _("must be one of {choices}").format(choices=str(context.get("expected", "")).replace("'", ""))
     if kind == "string_pattern_mismatch" and "|all" in str(context.get("pattern")):
-        # How all that ask for the last so many readings are made: a number, or one of these words.
+        # How all that ask for the last N readings are made: a number, or one of these words.
         words = str(context["pattern"]).rstrip(")$").split("|")[1:]
         return _("must be a number of readings from 1 on, such as 500, or one of: {words}").format(
             words=", ".join(words)

@@ -78,7 +78,7 @@ def test_the_right_pin_forgets_the_wrong_ones(database: Database, ana: int) -> N
         assert session.scalars(select(LoginFailure)).all() == []
 
 
-def test_guessing_badges_is_slowed_down_whoever_shows_an_own_one_between(database: Database, ana: int) -> None:
+def test_guessing_badges_is_slowed_down_whatever_person_shows_an_own_one_between(database: Database, ana: int) -> None:
     for number in range(FREE_BADGES):
         assert seen(database, Shown(badge=f"77001122{number:02}")) == "not-identified"
         if number < FREE_BADGES - 1:

@@ -136,7 +136,7 @@ class TestNames:
             "Cafe\u0301",
         ],
     )
-    def test_whoever_is_added_can_sign_in(self, database: Database, name: str) -> None:
+    def test_anyone_who_is_added_can_sign_in(self, database: Database, name: str) -> None:
         with database.begin() as session:
             add(session, name)
         for typed in (name, f" {name.upper()} ", unicodedata.normalize("NFD", name)):

@@ -398,7 +398,7 @@ def test_a_rejection_that_somebody_was_quicker_with_leaves_nothing_on_offer(tmp_
     assert not unit.orders
 
 
-def test_what_stands_behind_a_rejected_correction_of_its_tool_is_asked_for_anew(tmp_path: Path) -> None:
+def test_what_stands_behind_a_rejected_correction_of_its_tool_is_asked_for_again(tmp_path: Path) -> None:
     """It was to follow the one that is rejected: the control will hold another offset before it, and lead to another."""
     server = Scripted(correction(18, after=-0.2, amount=-0.2), correction(19, after=-0.21))
     unit = story(tmp_path, server)

@@ -306,7 +306,7 @@ class TestFollowing:
         resumed = [headers.get("last-event-id") for _line, headers, _body in script.asked]
         assert resumed == [None, "8", "8"]
 
-    def test_whoever_follows_after_a_number_says_so_and_hears_heartbeats_if_asked(
+    def test_anyone_who_follows_after_a_number_says_so_and_hears_heartbeats_if_asked(
         self, client: Either, script: Script
     ) -> None:
         script.steps = [stream("event: heartbeat\ndata: {}\n\n")]

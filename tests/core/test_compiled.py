@@ -83,6 +83,6 @@ def test_it_says_the_same_as_the_python() -> None:
     assert np.array_equal(quick(values), doubled(values))
 
 
-def test_where_nothing_can_be_written_it_is_compiled_anew(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_where_nothing_can_be_written_it_is_compiled_again(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(CacheImpl, "_locator_classes", [])
     assert compiled(doubled)(np.array([1.5]))[0] == 3.0

@@ -290,7 +290,7 @@ def test_ctrl_c_in_the_terminal_does_not_reach_the_server(data: Path) -> None:
         assert os.getpgid(server) != os.getpgid(0)
 
 
-def test_an_initdb_killed_half_way_is_begun_anew(folder: Path) -> None:
+def test_an_initdb_killed_half_way_is_begun_again(folder: Path) -> None:
     half = folder / "data" / "postgres.new-abc"
     half.mkdir(parents=True)
     (half / "PG_VERSION").write_text("18\n")

@@ -123,7 +123,7 @@ class TestHole:
         must_hold(new)
         must_replay(read(PARAMETERS)[0], history(new, shop.characteristic))
 
-    def test_whoever_listens_is_let_go_and_loads_anew(self, servers: Cluster, inband: Server) -> None:
+    def test_anyone_who_listens_is_let_go_and_loads_again(self, servers: Cluster, inband: Server) -> None:
         """The journal of the new server lacks what was told last: its numbers name other events."""
         servers.ask_for(quorum=False)
         shop = Shop(inband)

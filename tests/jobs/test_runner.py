@@ -172,7 +172,7 @@ def test_of_two_processes_one_runs_the_jobs_and_the_other_takes_over(database: D
     assert said == sorted(said, key=("one", "other").index), "they went at the same time"
 
 
-def test_a_connection_that_breaks_is_made_anew(database: Database, caplog: pytest.LogCaptureFixture) -> None:
+def test_a_connection_that_breaks_is_made_again(database: Database, caplog: pytest.LogCaptureFixture) -> None:
     count = Count()
     cut = text(
         "SELECT pg_terminate_backend(pid) FROM pg_stat_activity"

@@ -128,7 +128,7 @@ def test_a_cookie_of_backslashes_holds_up_nobody(port: int, sign: str) -> None:
     assert int(answer.text) < 1000  # ms of a processor; some 2 are needed
 
 
-def test_whoever_says_nothing_is_let_go(port: int) -> None:
+def test_anyone_who_says_nothing_is_let_go(port: int) -> None:
     with connected(port) as client:
         assert heard(client) == b""
 

@@ -156,7 +156,7 @@ class MqttLink:
             timeout=math.inf,  # the caller has one; that of aiomqtt may swallow a cancellation in Python 3.11
         )
         client._client.manual_ack_set(True)  # noqa: SLF001 - aiomqtt has no word of its own for it
-        client.pending_calls_threshold = IN_FLIGHT  # so many answers at once are meant: no warning about them
+        client.pending_calls_threshold = IN_FLIGHT  # that many answers at once are meant: no warning about them
         try:
             await client.__aenter__()
             self._client = client

@@ -503,7 +503,7 @@ def _hint(identifier: str) -> str:
     if identifier.startswith("/NC/"):
         return f"Is INBAND[{SIZE}] defined (UGUD.DEF is GD3, MGUD.DEF is GD2), and active? Older ring programs had 96."
     if identifier.startswith(R_PARAMETERS):
-        return "Has the channel so many R parameters (MD 28050)?"
+        return "Has the channel that many R parameters (MD 28050)?"
     return "Look for a typing error."
 
 

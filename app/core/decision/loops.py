@@ -113,7 +113,7 @@ class Quiet(NamedTuple):
 
     @classmethod
     def room(cls, count: int) -> "Quiet":
-        """Room for so many readings."""
+        """Room for N readings."""
         deviation, decided, before, after = np.zeros((4, count))
         zone, code = np.zeros((2, count), np.int8)
         return cls(np.zeros(count, np.int64), deviation, decided, before, after, zone, code)
@@ -196,7 +196,7 @@ class ReplayResult(NamedTuple):
 
     @classmethod
     def room(cls, count: int) -> "ReplayResult":
-        """Room for so many readings; 0 if only the tally is wanted."""
+        """Room for N readings; 0 if only the tally is wanted."""
         deviation, decided, average, amount, offset = np.zeros((5, count))
         zone, code = np.zeros((2, count), np.int8)
         return cls(deviation, decided, average, amount, offset, zone, code)

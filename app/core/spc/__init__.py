@@ -25,4 +25,4 @@ readings is refused with a `Refusal` that says how many are missing.
 """
 
 USUAL_READINGS = 1000
-"""The default window of every index, in all rooms: the last so many readings, as many as percentiles want."""
+"""The default window of every index, in all rooms: the last N readings, as many as percentiles want."""

@@ -378,7 +378,7 @@ def order_statistics(share: float, readings: int, confidence: float) -> tuple[in
     """
     doubt = (1 - confidence) / 2
     most = min(readings, int(readings * share + 12 * sqrt(readings * share) + 40))
-    below = bdtr(np.arange(most, dtype=np.float64), readings, share)  # P(at most so many readings below the quantile)
+    below = bdtr(np.arange(most, dtype=np.float64), readings, share)  # P(at most N readings below the quantile)
     inner = int(np.searchsorted(below, 1 - doubt))
     outer = int(np.searchsorted(below, doubt, side="right")) - 1
     return outer if outer >= 0 else None, inner if inner < readings else None

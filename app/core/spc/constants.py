@@ -47,7 +47,7 @@ def range_at_most(w: Floats, n: int) -> Floats:
     """P(W <= w) of the range W of n values, w >= 0 in sigma."""
     if n <= LARGE:
         far, x = FAR, FAR * NODES
-    else:  # the smallest of so many is never above the mean
+    else:  # the smallest of several is never above the mean
         far, x = FARTHER / 2, FARTHER / 2 * (NODES - 1)
     density = np.exp(-x * x / 2) / sqrt(2 * np.pi)
     outside = np.minimum(ndtr(x) + ndtr(-x - w[:, None]), 1 - 1e-16)

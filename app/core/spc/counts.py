@@ -80,7 +80,7 @@ def counts_chart(
     """Points and limits of counts.
 
     counts: rejected parts or nonconformities, in order of time. inspected: parts or units of each; one number for all, and for c
-    none. baseline: so many first points estimate centre and sigma z, all if left out. centre: a share, or a rate per unit,
+    none. baseline: the number of first points that estimate centre and sigma z, all if left out. centre: a share, or a rate per unit,
     that is given and not estimated.
 
     Raises `Refused`: fewer than two points, counts that none is beyond 0 of, samples of unequal size for np or c.

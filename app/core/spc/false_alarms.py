@@ -22,7 +22,7 @@ from app.core.spc.shewhart import Chart
 
 NODES, WEIGHTS = np.polynomial.legendre.leggauss(200)
 LONGEST = 1e9
-"""Points: rarer than once in so many is not distinguished. A process of a part per second takes thirty years for them, and
+"""Points: rarer than once in this many is not distinguished. A process of a part per second takes thirty years for them, and
 the equations behind the longer run lengths cannot be solved with sixteen digits."""
 FARTHEST = 9.0  # sigma; beyond it lies nothing
 
@@ -30,7 +30,7 @@ FARTHEST = 9.0  # sigma; beyond it lies nothing
 class FalseAlarms(NamedTuple):
     """Average number of points from one signal to the next; infinite where nothing is watched.
 
-    `LONGEST`, and not exact: so many or more.
+    `LONGEST`, and not exact: that many or more.
     """
 
     every: float
@@ -42,7 +42,7 @@ class FalseAlarms(NamedTuple):
         return LONGEST <= self.every < float("inf")
 
     def expected(self, points: int) -> float:
-        """Number of signals that so many points bring by chance."""
+        """Number of signals that N points bring by chance."""
         return points / self.every
 
 

@@ -29,7 +29,7 @@ FITS = 0.01
 AS_GOOD = 3.0
 """Difference of the criterion up to which the readings hardly tell two distributions apart: odds below 5 to 1 (Kass and Raftery 1995)."""
 MOST_FITTED = 5000
-"""Of more readings so many, evenly taken, as for the test of normality."""
+"""Of more readings this many, evenly taken, as for the test of normality."""
 _Z, _WEIGHTS = np.polynomial.legendre.leggauss(160)
 _Z = 5.5 * _Z
 _U = ndtr(_Z)

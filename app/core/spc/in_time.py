@@ -47,9 +47,9 @@ FEWEST = 50
 ENOUGH = 125
 """Twenty-five subgroups of five are asked for."""
 MOST_SUBGROUPS = 200
-"""Of longer runs so many subgroups, evenly spread: with more of them what does not matter becomes significant."""
+"""Of longer runs this many subgroups, evenly spread: with more of them what does not matter becomes significant."""
 BLOCKS = 10
-"""In so many pieces of time the scatter is compared."""
+"""In this many pieces of time the scatter is compared."""
 
 
 class Model(StrEnum):

@@ -62,7 +62,7 @@ def machine_performance(
 
 
 def newest_run(changed: NDArray[np.bool_], length: int) -> slice:
-    """The newest readings, so many one after the other, with nothing changed before any of them but the first.
+    """The newest N readings, one after the other, with nothing changed before any of them but the first.
 
     changed: of each reading whether something was changed before it. Raises `Refused` with the longest run that there is.
 

@@ -144,7 +144,7 @@ class Signals:
         return len(self.runs[name])
 
     def newest(self, most: int) -> list[Run]:
-        """The last so many signals by where they end, the newest last; of those that end together the later rule."""
+        """The last N signals by where they end, the newest last; of those that end together the later rule."""
         names = list(self.runs)
         if not names:
             return []
@@ -254,16 +254,16 @@ def _fed(
     return equal_runs(z, offset, last, int(rule.kind), rule.n, rule.limit, state[0], earlier)
 
 
-def signals(z: ArrayLike, rules: Iterable[Rule] = NELSON, anew: Iterable[int] = ()) -> Signals:
-    """Every signal of these rules on these points. anew: places, ascending, where the rules begin again: no run goes over one.
+def signals(z: ArrayLike, rules: Iterable[Rule] = NELSON, restarts: Iterable[int] = ()) -> Signals:
+    """Every signal of these rules on these points. restarts: places, ascending, where the rules begin again: no run goes over one.
 
     >>> [(run.rule.value, run.start, run.end) for run in signals([0.1] * 9 + [-0.1])]
     [('nelson_2', 0, 8)]
-    >>> [(run.start, run.end) for run in signals([0.1] * 18, anew=[4])]
+    >>> [(run.start, run.end) for run in signals([0.1] * 18, restarts=[4])]
     [(4, 17)]
     """
     points, chosen = checked(z), tuple(rules)
-    edges = sorted({0, len(points), *(place for place in anew if 0 < place < len(points))})
+    edges = sorted({0, len(points), *(place for place in restarts if 0 < place < len(points))})
     found: dict[RuleName, list[NDArray[np.int64]]] = {rule.name: [] for rule in chosen}
     for begin, end in pairwise(edges):
         scan = Scan(chosen)
@@ -273,21 +273,21 @@ def signals(z: ArrayLike, rules: Iterable[Rule] = NELSON, anew: Iterable[int] = 
     return Signals(len(points), {name: np.concatenate(rows) for name, rows in found.items()})
 
 
-def signals_of(chart: ControlChart, rules: Iterable[Rule] = NELSON, anew: Iterable[int] = ()) -> Signals:
-    """The signals of a chart: of the rules that fit it, with rule 1 at the limits that the chart has. anew: as above."""
+def signals_of(chart: ControlChart, rules: Iterable[Rule] = NELSON, restarts: Iterable[int] = ()) -> Signals:
+    """The signals of a chart: of the rules that fit it, with rule 1 at the limits that the chart has. restarts: as above."""
     width = chart.baseline.width
     fitting = [
         Rule(rule.name, rule.kind, rule.n, rule.k, width) if rule.name is RuleName.NELSON_1 else rule
         for rule in rules
         if rule.name in FITTING[chart.chart]
     ]
-    return signals(chart.z, fitting, anew)
+    return signals(chart.z, fitting, restarts)
 
 
-def signals_of_cusum(chart: Cusum, anew: Iterable[int] = ()) -> Signals:
+def signals_of_cusum(chart: Cusum, restarts: Iterable[int] = ()) -> Signals:
     """The signals of a CUSUM: runs of points whose upper (side 1) or lower sum (side -1) is above h.
 
-    When the change began is another question: `Cusum.since_above` points back to where the sum left 0. anew: as `signals`.
+    When the change began is another question: `Cusum.since_above` points back to where the sum left 0. restarts: as `signals`.
 
     >>> from app.core.spc.cusum import cusum
     >>> from app.core.spc.shewhart import given
@@ -297,7 +297,7 @@ def signals_of_cusum(chart: Cusum, anew: Iterable[int] = ()) -> Signals:
     once = [Rule(RuleName.NELSON_1, RuleKind.BEYOND, 1, 1, chart.limit)]
     rows = []
     for side, sums in ((1, chart.above), (-1, chart.below)):
-        runs = signals(sums, once, anew).runs[RuleName.NELSON_1] if len(sums) else np.empty((0, 4), np.int64)
+        runs = signals(sums, once, restarts).runs[RuleName.NELSON_1] if len(sums) else np.empty((0, 4), np.int64)
         runs[:, 0] = side
         rows.append(runs)
     together = np.concatenate(rows)

@@ -29,7 +29,7 @@ FAR, GAP, ALWAYS_FAR, QUARTILES = 10.0, 2.0, 50.0, 1.349
 any case; the quartiles of a normal distribution lie 1.349 sigma apart."""
 FEWEST_TO_STAND_OUT = 8
 STEP = 4.0
-"""Ranges of neighbours of more than so many mean ranges are steps, not scatter: a new edge, an offset set by hand."""
+"""Ranges of neighbours of more than this many mean ranges are steps, not scatter: a new edge, an offset set by hand."""
 
 
 class Estimator(StrEnum):

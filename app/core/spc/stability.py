@@ -4,7 +4,7 @@ Not to be taken for the behaviour in time of ISO 22514 (`in_time`), which tests 
 
 No signal at all is too much to ask of many readings: a rule fires on a process in control too, once in its average run length
 (`chance`). So signals are counted, runs of points each once, and compared with what chance brings: under it their number
-is nearly Poisson's with mean points / run length. The process counts as out of control if for one of the rules so many have
+is nearly Poisson's with mean points / run length. The process counts as out of control if for one of the rules that many have
 less than one chance in a thousand, divided among the rules (Bonferroni). Signals are sized as well as counted: one point
 beyond `GROSS` sigma is enough, for chance brings none in a hundred million.
 """
@@ -30,7 +30,7 @@ WATCHED = (RuleName.NELSON_1, RuleName.NELSON_2, RuleName.NELSON_3, RuleName.NEL
 
 
 class Fired(NamedTuple):
-    """Number of signals of a rule, the number that chance explains, and the probability of so many by chance."""
+    """Number of signals of a rule, the number that chance explains, and the probability of that many by chance."""
 
     rule: RuleName
     signals: int

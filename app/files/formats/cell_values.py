@@ -242,7 +242,7 @@ def _by_pattern(text: str, pattern: str) -> datetime:
 
 
 def _counted(text: str, pattern: str, count: re.Match[str]) -> datetime:
-    """A time as so many days of the calendar, or (milli)seconds of UTC, since a date."""
+    """A time as a count of days of the calendar, or (milli)seconds of UTC, since a date."""
     try:
         milliseconds = round(float(text.replace(",", ".")) * (_UNITS[count[1]] / timedelta(milliseconds=1)))
         read = datetime.fromisoformat(count[2]) + timedelta(milliseconds=milliseconds)

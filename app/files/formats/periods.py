@@ -20,7 +20,7 @@ NAMES = ("from", "to")
 
 
 def begin_of(day: date, zone: ZoneInfo, days: int = 0) -> datetime:
-    """The first moment of the day, or of the one so many days later. Raises `Unreadable` beyond the calendar."""
+    """The first moment of the day, or of the one N days later. Raises `Unreadable` beyond the calendar."""
     try:
         at = datetime.combine(day + timedelta(days), time(), zone)
         # By way of UTC: where the clocks go forward at midnight, the day begins at one o'clock.

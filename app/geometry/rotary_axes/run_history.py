@@ -213,9 +213,9 @@ def in_order(values: Mapping[str, Item]) -> dict[str, Item]:
     return {name: values[name] for name in UNITS if name in values}
 
 
-def same(stored: Mapping[str, Any], anew: Mapping[str, Any]) -> bool:
+def same(stored: Mapping[str, Any], computed: Mapping[str, Any]) -> bool:
     """Tell if two evaluations agree, to the last digits that mean anything (a nanometre)."""
-    return all(_alike(stored[name], anew[name]) for name in ("axes", "offsets", "balls"))
+    return all(_alike(stored[name], computed[name]) for name in ("axes", "offsets", "balls"))
 
 
 def _alike(one: Any, other: Any) -> bool:

@@ -244,7 +244,7 @@ def _keep(
             changes.append(alarms.news(machine.key, alarm))
     else:
         changes += end_alarms(session, machine, made)
-        count_anew(session, machine, place, made.calibrated_at)
+        count_again(session, machine, place, made.calibrated_at)
         plan = session.get(CalibrationPlan, (machine.id, *place), populate_existing=True)
         sure = not made.settings.get("warnings")  # what may be wrong is for a person to accept
         if made.proposed is not None and sure and plan is not None and plan.acceptance == "automatic":
@@ -268,7 +268,7 @@ def end_alarms(session: Session, machine: Machine, made: CalibrationRecord) -> l
     return [alarms.news(machine.key, alarm) for alarm in ended if alarm is not None]
 
 
-def count_anew(session: Session, machine: Machine, place: Place, since: datetime) -> None:
+def count_again(session: Session, machine: Machine, place: Place, since: datetime) -> None:
     """Parts and days until the next calibration begin at 0."""
     counts = {
         str(row.characteristic_id): row.sequence
@@ -339,7 +339,7 @@ def set_plan(
     plan = session.get(CalibrationPlan, (machine.id, *place), populate_existing=True)
     settings = given.model_dump()
     if plan is None:
-        count_anew(session, machine, place, datetime.now(UTC))
+        count_again(session, machine, place, datetime.now(UTC))
         plan = session.get_one(CalibrationPlan, (machine.id, *place), populate_existing=True)
     before = {name: getattr(plan, name) for name in settings}
     for name, value in settings.items():

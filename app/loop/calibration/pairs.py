@@ -13,7 +13,7 @@ from app.db.events import publish
 from app.errors import Conflict, Invalid
 from app.language.i18n import _
 from app.loop.calibration import queries, wording
-from app.loop.calibration.actions import count_anew, end_alarms, news, put_into_effect
+from app.loop.calibration.actions import count_again, end_alarms, news, put_into_effect
 from app.loop.calibration.queries import CalibrationRow, Place
 from app.loop.calibration.schemas import PairIn
 from app.loop.machines.queries import lock_machines
@@ -143,7 +143,7 @@ def accept_suggestion(
     session.add(record)
     session.flush()
     changes = end_alarms(session, machine, record)
-    count_anew(session, machine, place, record.calibrated_at)
+    count_again(session, machine, place, record.calibrated_at)
     put_into_effect(session, machine, record, reason, caller)
     publish(session, news(machine, record), *changes)
     return queries.calibration(session, machine, record.number)

@@ -306,7 +306,7 @@ def pairs(
     only: int | None = None,
     newest: bool = False,
 ) -> list[Pair]:
-    """Paired readings of a location, oldest first; with ``newest`` the last so many."""
+    """Paired readings of a location, oldest first; with ``newest`` the last N."""
     since = origin(session, machine, location)
     sizes = targets(session, machine, location)
     query = (

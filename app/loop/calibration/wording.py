@@ -181,7 +181,7 @@ def warning_sentence(warning: CodedWarning) -> str:
 def cannot_accept(row: CalibrationRow) -> tuple[str, str]:
     """The reason why there is nothing to accept, and what to do instead."""
     number, acceptance = row.record.number, row.acceptance
-    anew = _("Calibrate again if in doubt.")
+    again = _("Calibrate again if in doubt.")
     if acceptance is not None:
         return (
             _("Calibration {number} was accepted by {who} on {at} already: {reason}").format(
@@ -197,7 +197,7 @@ def cannot_accept(row: CalibrationRow) -> tuple[str, str]:
         "unchanged": _("Calibration {number} has confirmed what is in effect: there is nothing to accept."),
         "overtaken": _("Since calibration {number} there has been a newer one, or the value was changed otherwise."),
     }
-    return sentences.get(row.status, "{number}").format(number=number), anew
+    return sentences.get(row.status, "{number}").format(number=number), again
 
 
 def what_pairs_say(found: Comparison, empirical_value: float) -> str:

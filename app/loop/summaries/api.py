@@ -53,11 +53,11 @@ def get_statistics(
     caller: AnyCaller,
     characteristic: CharacteristicKey,
     period: InPeriod,
-    last: Annotated[int | None, Query(ge=1, le=LARGEST_ID, description="Only of the last so many readings.")] = None,
+    last: Annotated[int | None, Query(ge=1, le=LARGEST_ID, description="Only of the last N readings.")] = None,
 ) -> StatisticsOut:
     """Number, mean, standard deviation, extremes, zones: exact, of all readings or of those measured in a period.
 
-    With `last` as well, of the last so many readings those that were measured in it count.
+    With `last` as well, of the last N readings those that were measured in it count.
     """
     current = characteristics.characteristic_for(session, caller, characteristic, "viewer")
     window = queries.window_of(session, current.characteristic, last=last, period=period)

@@ -163,7 +163,7 @@ def event_lane(
 ) -> list[Series | Rule | Note]:
     """Marks and words of the events within the span, and in the legend what their shapes mean.
 
-    span: of the axis, so many pixels wide; moments as seconds (Unix time). beside: pixels that words may reach out at its
+    span: of the axis, N pixels wide; moments as seconds (Unix time). beside: pixels that words may reach out at its
     right. lines: upward through the chart, at what somebody changed. A word is left out where it would not fit.
     """
     within = [event for event in events if span[0] <= _number(event.at) <= span[1]]

@@ -32,7 +32,7 @@ class Run:
 
 
 def newest_run(session: Session, study: Study, length: int = RUN) -> Run | Refused:
-    """The newest run of so many parts between which no correction came into effect, no tool was changed and nothing was set.
+    """The newest run of N parts between which no correction came into effect, no tool was changed and nothing was set.
 
     Of the last 5000 readings, by the limits of the study; a `Refused` says how long the longest run among them is.
     """

@@ -61,7 +61,7 @@ class NormalityOut(BaseModel):
     test: Literal["anderson_darling", "shapiro_wilk"] = Field(description="Name of the test.")
     statistic: float | None = Field(description="A² or W; null where it could not be made.")
     p_value: float | None
-    readings: int = Field(description="Looked at; of more than 5000 so many, evenly taken.")
+    readings: int = Field(description="Looked at; of more than 5000, 5000 evenly taken.")
     text: str
 
     @classmethod

@@ -21,9 +21,9 @@ from app.quality.capability.tables import CapabilityVerdict
 from app.quality.capability.weekly import weeks_of
 
 DUE_SHARE, DUE_AFTER = 0.02, timedelta(minutes=10)
-"""The job works an index out again after so many new readings, as a share of those it is of, or after so long with any."""
+"""The job works an index out again after this share of new readings among those it is of, or after so long with any."""
 OLD_SHARE, OLD_AFTER = 0.04, timedelta(hours=1)
-"""Beyond these an index is worked out on the spot, of so many characteristics at most; others show what is stored."""
+"""Beyond these an index is worked out on the spot, of this many characteristics at most; others show what is stored."""
 MOST_ON_THE_SPOT = 25
 NOT_YET = "not_yet"
 """The reason where nothing is stored yet."""
@@ -107,7 +107,7 @@ def states(
 
 
 def is_older(row: CapabilityVerdict, state: State, now: datetime, share: float, after: timedelta) -> bool:
-    """Tell whether something that it depends on has changed, or so many new readings have come, or some so long ago."""
+    """Tell whether something that it depends on has changed, or enough new readings have come, or some so long ago."""
     depends = (state.parameters_version, state.baseline, state.excluded, RULE)
     if (row.parameters_version, row.baseline, row.excluded, row.rule) != depends:
         return True

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from app.quality.capability.verdict_queries import State
 
 SHARE, AFTER = 0.05, timedelta(hours=1)
-"""Weeks are judged again after so many new readings, as a share of those of the newest week, or after so long with any."""
+"""Weeks are judged again after this share of new readings among those of the newest week, or after so long with any."""
 
 _TOUCHED = """
 SELECT DISTINCT CAST(date_trunc('week', measured_at AT TIME ZONE :zone) AS date) FROM reading

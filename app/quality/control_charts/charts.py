@@ -103,7 +103,7 @@ def _drawn(
     main = replace(
         main,
         settling=_settling(points, window),
-        signals=rules.signals_of(points.chart, chosen, _anew(baseline, points.first)),
+        signals=rules.signals_of(points.chart, chosen, _restarts(baseline, points.first)),
     )
     return since(main, window.first)
 
@@ -175,15 +175,15 @@ def _view(points: Charted, kind: Chart, chart: ControlChart | None, kept: NDArra
         centre=chart.centre,
         lower=chart.lower,
         upper=chart.upper,
-        signals=_limits_only(chart, _anew(points.baseline, view.first)),
+        signals=_limits_only(chart, _restarts(points.baseline, view.first)),
     )
 
 
-def _limits_only(chart: ControlChart, anew: Iterable[int]) -> Signals:
-    return rules.signals_of(chart, [RULES[RuleName.NELSON_1]], anew)
+def _limits_only(chart: ControlChart, restarts: Iterable[int]) -> Signals:
+    return rules.signals_of(chart, [RULES[RuleName.NELSON_1]], restarts)
 
 
-def _anew(baseline: Baseline, first: Whole) -> list[int]:
+def _restarts(baseline: Baseline, first: Whole) -> list[int]:
     """The points at which the rules begin again: the first of the baseline's period, and the first that is monitored.
 
     What lies before the period was another process. The stored signals begin with the first reading after it.
@@ -221,7 +221,7 @@ def _moving_ranges(points: Charted, window: Window) -> View:
         centre=chart.centre,
         lower=chart.lower,
         upper=chart.upper,
-        signals=_limits_only(chart, _anew(points.baseline, empty.first)),
+        signals=_limits_only(chart, _restarts(points.baseline, empty.first)),
     )
 
 
@@ -243,7 +243,7 @@ def _remembering(
     points = charted(session, current, singly, replace(window, first=begin))
     series = points.series.only(points.series.sequence >= begin)  # what was read before set levels
     sequence, values = series.sequence, series.values
-    pieces = [part for part in np.split(values, _anew(baseline, sequence)) if len(part)]
+    pieces = [part for part in np.split(values, _restarts(baseline, sequence)) if len(part)]
     inside = sequence >= window.first
     view = View(
         kind,
@@ -279,7 +279,7 @@ def _remembering(
         centre=together.centre,
         lower=together.lower,
         upper=together.upper,
-        signals=_limits_only(together, _anew(baseline, view.first)),
+        signals=_limits_only(together, _restarts(baseline, view.first)),
     )
 
 
@@ -322,5 +322,5 @@ def _sums(view: View, baseline: Baseline, pieces: list[Floats], shown: NDArray[n
         centre=0.0,
         lower=-together.limit,
         upper=together.limit,
-        signals=rules.signals_of_cusum(together, _anew(baseline, view.first)),
+        signals=rules.signals_of_cusum(together, _restarts(baseline, view.first)),
     )

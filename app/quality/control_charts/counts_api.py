@@ -38,7 +38,11 @@ class CountsIn(Body):
         None, description="Parts or units of each sample, one number for all; left out for `c`."
     )
     baseline: int | None = Field(
-        None, ge=2, le=MOST, strict=True, description="So many first samples give centre and limits; all if left out."
+        None,
+        ge=2,
+        le=MOST,
+        strict=True,
+        description="Number of first samples that give centre and limits; all if left out.",
     )
     centre: float | None = Field(
         None, strict=True, gt=0, le=LARGEST, description="A share or rate that is given, and not estimated."

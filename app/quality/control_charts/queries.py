@@ -26,7 +26,7 @@ from app.quality.control_charts.tables import Baseline
 LOOK_BACK = 100_000
 """Readings before the window that are looked through for what its first points need: the beginning of the edge, of the subgroup."""
 LOOK_AHEAD = 1_000
-"""Readings after the window that tell whether its last subgroup, by pause, part, shift or nest, ends in it; by size, so many."""
+"""Readings after the window that tell whether its last subgroup, by pause, part, shift or nest, ends in it; by size, that many."""
 
 
 def baseline_in_force(session: Session, characteristic: Characteristic) -> Baseline | None:

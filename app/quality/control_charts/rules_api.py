@@ -54,7 +54,7 @@ def preview_rules(
     characteristic: CharacteristicKey,
     last: Annotated[
         int | None,
-        Query(ge=1, le=LARGEST_ID, description="Of the last so many readings; of all, a million at most, if left out."),
+        Query(ge=1, le=LARGEST_ID, description="Of the last N readings; of all, a million at most, if left out."),
     ] = None,
 ) -> PreviewOut:
     """Count the signals of each rule on the last readings by the baseline in force, and the signals that chance explains.

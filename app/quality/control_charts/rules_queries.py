@@ -79,7 +79,7 @@ class RuleTrial:
 
     @cached_property
     def more_than_chance(self) -> bool:
-        """True if there are more than chance explains: it would give so many or more less than once in a hundred times."""
+        """True if there are more than chance explains: it would give that many or more less than once in a hundred times."""
         return self.signals > 0 and float(pdtrc(self.signals - 1, self.expected)) < SELDOM
 
 
@@ -98,7 +98,7 @@ class Preview:
 
 
 def preview(session: Session, current: CurrentCharacteristic, rules: Rules, last: int | None = None) -> Preview | None:
-    """Signals of these rules, and of every other one, on the last so many readings; None without a baseline.
+    """Signals of these rules, and of every other one, on the last N readings; None without a baseline.
 
     Of more than a million readings the last million is looked at.
     """

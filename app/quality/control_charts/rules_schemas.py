@@ -104,12 +104,14 @@ class TriedOut(BaseModel):
         description="Points that lie in a signal; of several rules together each counts once for every signal it lies in."
     )
     every: float | None = Field(
-        description="Points from one signal to the next by chance alone; 1e9, not exact: so many or more; null: never."
+        description="Points from one signal to the next by chance alone; 1e9, not exact: that many or more; null: never."
     )
     per_1000: float = Field(description="Signals by chance alone on 1000 points.")
-    expected: float = Field(description="Signals by chance alone on so many points.")
+    expected: float = Field(description="Signals by chance alone on that many points.")
     exact: bool = Field(description="Whether the chance is known exactly.")
-    more_than_chance: bool = Field(description="Chance alone gives so many signals less than once in a hundred times.")
+    more_than_chance: bool = Field(
+        description="Chance alone gives that many signals less than once in a hundred times."
+    )
     text: str
 
 

@@ -126,7 +126,7 @@ def summary(everything: RuleTrial) -> str:
 
 
 def signals(number: int) -> str:
-    """So many signals."""
+    """The number of signals in words."""
     return ngettext("%(n)s signal", "%(n)s signals", number) % {"n": grouped(number)}
 
 

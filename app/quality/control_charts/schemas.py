@@ -52,7 +52,7 @@ class PeriodIn(Body):
     last_sequence: Place = Field(description="The last reading of the period.")
     grouping: Grouping | None = Field(
         None,
-        description="For subgroups: so many readings one after the other, a pause that ends one, or neighbours of the same part, "
+        description="For subgroups: a fixed number of readings one after the other, a pause that ends one, or neighbours of the same part, "
         "shift (as the plant's shifts are set now; the baseline keeps them) or nest (spindle, cavity: the `nest` of their context).",
     )
     pooled: bool = Field(

@@ -59,8 +59,8 @@ def _single(entries: Sequence[dict[str, Any]]) -> list[int]:
     """The reading that may be a false one: where all that is reported is one point beyond the limits."""
     if len(entries) != 1 or entries[0]["points"] != 1 or entries[0].get("runs", 1) != 1:
         return []
-    told_of_reading = (entries[0]["chart"], entries[0]["rule"]) == (Chart.INDIVIDUALS, RuleName.NELSON_1)
-    return [entries[0]["last"]] if told_of_reading else []
+    of_reading = (entries[0]["chart"], entries[0]["rule"]) == (Chart.INDIVIDUALS, RuleName.NELSON_1)
+    return [entries[0]["last"]] if of_reading else []
 
 
 def extend_alarms(session: Session, grown: Sequence[Signal]) -> None:

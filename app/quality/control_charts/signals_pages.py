@@ -94,7 +94,7 @@ def _signal(
         "control_charts/signal.html",
         status=error.status if error else 200,
         row=row,
-        told=data,
+        data=data,
         chart=Chart(row.signal.chart),
         rule=RuleName(row.signal.rule),
         figure=f"/api/v1/characteristics/{row.characteristic.key}/figures/control?{urlencode(query)}",

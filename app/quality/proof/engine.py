@@ -342,7 +342,7 @@ def following(given: Given) -> Got:
 def parts_left(given: Given) -> Got:
     """Shares of the forecasts at each moment of a tool life that hold the parts that it really takes.
 
-    Of each operation so many edges that are over teach the width, then one that is left out of them is forecast.
+    Of each operation N edges that are over teach the width, then one that is left out of them is forecast.
     """
     rng = np.random.default_rng(given["seed"])
     held: dict[float, list[bool]] = {share: [] for share in LOOKS}
@@ -354,9 +354,9 @@ def parts_left(given: Given) -> Got:
         for share in LOOKS:
             now = int(len(curve) * share)
             line = fit(np.arange(1, now + 1), curve[:now])
-            told = None if line is None else forecast(line, 1.0, widening)
-            if told is not None:
-                held[share].append(told.low <= len(curve) - now <= told.high)
+            ahead = None if line is None else forecast(line, 1.0, widening)
+            if ahead is not None:
+                held[share].append(ahead.low <= len(curve) - now <= ahead.high)
     return {f"held_at_{share:.0%}".rstrip("%"): float(np.mean(each)) for share, each in held.items()}
 
 

@@ -35,7 +35,7 @@ from app.quality.wear.tables import Outlook
 
 MOST_READINGS = 1_200  # read one by one
 LIVES_LOOKED_BACK = 6_000  # readings on whose tool lives forecasts are tested
-MOST_GROUPS, GROUP = 300, 16  # what is older: so many groups of so many readings
+MOST_GROUPS, GROUP = 300, 16  # what is older: this many groups of this many readings
 FEW = hunting.LONGEST  # of a tool that has cut fewer parts the chart shows the one before too
 PLANNED, NEAR = 500, 100  # parts: what lies further ahead is not shown on the plant's page; what is nearer stands out
 MOST_EVENTS = 5_000  # steps of the tool's offset that are looked through
@@ -152,7 +152,7 @@ def life_of(session: Session, current: CurrentCharacteristic) -> Window:
 
 
 def shown(session: Session, current: CurrentCharacteristic, last: str | None) -> Window:
-    """The readings that a chart is asked for: `tool` (of few, those before too), `all`, or the last so many."""
+    """The readings that a chart is asked for: `tool` (of few, those before too), `all`, or the last N."""
     if last in (None, "tool"):
         life = life_of(session, current)
         return life if life.count >= FEW else statistics.window_of(session, current.characteristic, last=FEW)

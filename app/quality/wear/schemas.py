@@ -86,7 +86,7 @@ class HuntingOut(BaseModel):
     mean_size: float | None = Field(description="Mean size error that a correction removed.")
     scatter: float = Field(description="Standard deviation of the process, from successive differences.")
     probability: float = Field(
-        description="Of so many reversals where 1 reading in 10 is tolerable; alarm below 0.001."
+        description="Of that many reversals where 1 reading in 10 is tolerable; alarm below 0.001."
     )
     expected_corrections: float | None = Field(description="Per reading, by scatter alone with these settings.")
     expected_reversals: float | None = Field(description="Per reading, by scatter alone with these settings.")

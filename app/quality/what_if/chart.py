@@ -6,7 +6,7 @@ from numpy.typing import NDArray
 from app.quality.what_if.figures import Course, CourseChart
 from app.quality.what_if.queries import Simulation
 
-MOST_POINTS = 500  # readings drawn one by one; of more, the extremes of so many stretches
+MOST_POINTS = 500  # readings drawn one by one; of more, the extremes of this many stretches
 
 
 def chart_of(answer: Simulation) -> CourseChart:

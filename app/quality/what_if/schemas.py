@@ -20,7 +20,7 @@ Length = Annotated[float, Field(ge=0, le=LARGEST_LENGTH, strict=True)]
 
 
 class ReplayPeriodIn(Body):
-    """Readings to replay: of the last so many those measured from … to; the last 1000 unless chosen otherwise."""
+    """Readings to replay: of the last N those measured from … to; the last 1000 unless chosen otherwise."""
 
     last: Annotated[int | None, Field(ge=1, le=LARGEST_ID, strict=True, description="The last N readings.")] = None
     start: Annotated[Beginning | None, Field(alias="from", description=BEGINNING)] = None

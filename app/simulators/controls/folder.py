@@ -15,7 +15,7 @@ from app.core.ring import Register, Slot, Unit
 from app.simulators.controls.model import Model
 
 AT = "the folder that files are written into; a new one if left out"
-HALVED, TWICE = 5, 7  # of so many files one
+HALVED, TWICE = 5, 7  # of this many files one
 HEAD = "Time;Part;Feature;Actual\r\n"
 
 

@@ -79,7 +79,7 @@ def lines(
 
 
 def run_line(line: Line, speed: float, past: float | None = None) -> None:
-    """The past if there is none yet (so many days, else some hours), then the present."""
+    """The past if there is none yet (of some days, else some hours), then the present."""
     if line.has_history():
         line.settle()
     else:

@@ -98,7 +98,7 @@ class Machine:
     pipeline: tuple[int, int]  # parts between the cut and the probe, at least and at most
     tools: tuple[Tool, ...]
     features: tuple[Feature, ...]
-    first_chip: tuple[int, int]  # after so many live parts the edge of this tool chips: something to see early
+    first_chip: tuple[int, int]  # after this many live parts the edge of this tool chips: something to see early
     signal_path: str = "direct"  # of the probe
     type: str = "other"
 

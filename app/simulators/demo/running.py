@@ -82,7 +82,7 @@ class Line:
     def fill(self, parts: int, days: float | None = None) -> None:
         """Push a past that ends now, as fast as the server takes it; each part is cut with what had been decided by then.
 
-        parts: how many are cut, without a night between them. days: what is cut in so many working days and the nights
+        parts: how many are cut, without a night between them. days: what is cut in that many working days and the nights
         and weekends between them, instead.
         """
         machine, nights = self.machine, days is not None

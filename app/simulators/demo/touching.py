@@ -52,8 +52,8 @@ def behind(admin: Client, machine: str, seed: int) -> None:
         for (place, normal), residual in zip(PLACES, FOUND, strict=True)
     ]
     alignment = {"machine": machine, "name": "casting on pallet 4", "touches": touches, "repeatability": TOUCH}
-    set_anew = {"work_offset": "G55", "base": [-306.01, -154.25, -299.85], "key": "align:1"}
-    admin.post("/alignments", alignment | set_anew)
+    set_again = {"work_offset": "G55", "base": [-306.01, -154.25, -299.85], "key": "align:1"}
+    admin.post("/alignments", alignment | set_again)
 
 
 def _zero(machine: str, at: int, shift: list[float], now: datetime, rng: Random) -> dict[str, Any]:

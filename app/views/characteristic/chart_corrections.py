@@ -17,7 +17,7 @@ from app.views.characteristic.figures.lanes import COUNTED
 from app.views.characteristic.wording import reading_link
 
 MOST_STEPS = 500
-MOST_SAMPLED = 200  # of more corrections than that, so many are shown, evenly spread
+MOST_SAMPLED = 200  # of more corrections than that, this many are shown, evenly spread
 MOST_BEFORE = 5_000  # corrections of a tool's life that are added up to where the chart begins
 MOST_CHANGES = 100
 MOST_MOMENTS = 200

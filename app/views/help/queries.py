@@ -116,7 +116,7 @@ def _address(target: str, name: str) -> str | None:
 
 @cache
 def sections() -> Sequence[Section]:
-    """How-tos and reference in sections, each from a heading to the next: search looks through them."""
+    """The sections of how-tos and reference, each from a heading to the next: search looks through them."""
     found: list[Section] = []
     for name, title in documents().items():
         if name.startswith("decisions/"):

@@ -49,5 +49,5 @@ def connections_of(session: Session, machine: Machine) -> list[Connection]:
 
 
 def _bridge(machine: Machine, row: bridges.ConnectionRow) -> Connection:
-    told = row.connection.detail or wording.explained(f"connection_{row.connection.state}")
-    return Connection(_("Bridge heard"), row.connection.received_at, told, f"/machines/{machine.key}/connection")
+    detail = row.connection.detail or wording.explained(f"connection_{row.connection.state}")
+    return Connection(_("Bridge heard"), row.connection.received_at, detail, f"/machines/{machine.key}/connection")

@@ -53,7 +53,7 @@ def _in_every_zone(moment: datetime) -> bool:
 
 @dataclass(frozen=True)
 class ReportRequest:
-    """Request for a report. `last`: only the last so many readings; of them those measured in the period."""
+    """Request for a report. `last`: only the last N readings; of them those measured in the period."""
 
     period: Period = ALWAYS
     last: int | None = None

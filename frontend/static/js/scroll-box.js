@@ -6,7 +6,7 @@ const watched = new WeakSet();
 
 const scrolls = (box) => box.scrollWidth > box.clientWidth + 1 || box.scrollHeight > box.clientHeight + 1;
 
-// All are measured before one is changed: otherwise the browser lays the page out anew for each box.
+// All are measured before one is changed: otherwise the browser lays the page out again for each box.
 const look = (boxes) => {
   const stops = boxes.filter(scrolls);
   for (const box of boxes) if (box.tabIndex === 0 && !stops.includes(box)) box.removeAttribute("tabindex");

@@ -144,7 +144,7 @@ def test_a_reading_measured_before_the_part_changed_belongs_to_the_part_before()
     run(work())
 
 
-def test_an_agent_started_anew_is_read_from_its_first_number() -> None:
+def test_an_agent_started_again_is_read_from_its_first_number() -> None:
     async def work() -> None:
         async with agent() as simulator, asking(simulator) as (context, http):
             for part in range(1, 20):

@@ -61,7 +61,7 @@ class TestSix:
         told = post(common_shop, 422, touches=touches([0.0] * 8), method="printed")
         assert "printed short form" in told["detail"]
 
-    def test_the_work_offset_is_set_anew_where_it_is_known(self, common_shop: Shop) -> None:
+    def test_the_work_offset_is_set_again_where_it_is_known(self, common_shop: Shop) -> None:
         made = post(common_shop, touches=SIX, work_offset="g55", base=[100.0, 200.0, -300.0])
         assert made["given"]["work_offset"] == "G55"
         assert "$P_UIFR[2]=CTRANS(X,10" in made["program"]

@@ -143,7 +143,7 @@ class TestKept:
         some = other.call("GET", f"/forms?machine={other.machine}&feature=f1&kind=flatness")["items"]
         assert [each["id"] for each in some] == numbers[1::2]
 
-    def test_it_is_computed_anew_and_both_results_stay(self, common_shop: Shop) -> None:
+    def test_it_is_computed_again_and_both_results_stay(self, common_shop: Shop) -> None:
         made = post(common_shop, **BORE)
         again = common_shop.call("POST", f"/forms/{made['id']}/recompute", 201, reason="new version")
         assert (again["id"], again["evaluation"], again["value"]) == (made["id"], 2, made["value"])

@@ -106,7 +106,7 @@ class TestGauge:
         assert "R33 and zero_range mean the same" in twice["errors"][0]["message"]
         shop.call("POST", path, 422, touches=[25.0], **by_number, R21=1, R23=1)
 
-    def test_the_average_goes_on_between_calibrations_and_begins_anew_with_a_new_value(self, shop: Shop) -> None:
+    def test_the_average_goes_on_between_calibrations_and_begins_again_with_a_new_value(self, shop: Shop) -> None:
         """k = 2 and R33 = 4 µm as in the published example: 3, 5, 6 µm make 1.5, 3.25 and 4.625 µm."""
         limits: dict[str, Any] = {"zero_range": 0.004, "averaging_limit": 0.0133}
         made = [calibrate(shop, touches=[199.852 + um / 1000], **limits) for um in (3, 5, 6)]

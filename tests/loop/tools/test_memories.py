@@ -157,7 +157,7 @@ class TestAverages:
         put = f"/machines/{shop.machine}/averages/{location}"
         shop.call("PUT", put, 404, empirical_value=0.1, reason="x")
 
-    def test_an_empirical_value_begins_the_average_anew_and_counts(self, shop: Shop) -> None:
+    def test_an_empirical_value_begins_the_average_again_and_counts(self, shop: Shop) -> None:
         shop.read(1.0)
         assert shop.average() == 0.0005
         put = f"/machines/{shop.machine}/averages/5"

@@ -302,7 +302,7 @@ class TestExpiry:
         shop.call("PATCH", f"/machines/{shop.machine}", corrections_expire_after=8.0)
         return shop
 
-    def test_it_is_superseded_and_the_next_reading_decides_anew(self, hasty: Shop, served: Database) -> None:
+    def test_it_is_superseded_and_the_next_reading_decides_again(self, hasty: Shop, served: Database) -> None:
         number = pending(hasty)
         rounds(served)
         assert hasty.correction(number)["status"] == "pending"
@@ -335,7 +335,7 @@ class TestExpiry:
         )
         assert hasty.tool()["offset"] == -0.006
 
-    def test_held_ones_wait_and_approved_ones_begin_anew(self, hasty: Shop, served: Database) -> None:
+    def test_held_ones_wait_and_approved_ones_begin_again(self, hasty: Shop, served: Database) -> None:
         hasty.add(f"{hasty.characteristic}-a", mode="approval", tool_memory=4, average_memory=6)
         approved = hasty.read(6.0, f"{hasty.characteristic}-a")["correction"]["number"]
         waiting = hasty.read(12.0, f"{hasty.characteristic}-a")["correction"]["number"]

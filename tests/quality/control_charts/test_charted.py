@@ -116,7 +116,7 @@ def test_every_chart_is_the_same_through_any_window(by: By, first: int, last: in
                 assert np.broadcast_to(mine, len(part)) == pytest.approx(wanted, abs=1e-12), kind
 
 
-def test_what_is_excluded_is_no_point_and_a_tool_begins_anew(history: Shop) -> None:
+def test_what_is_excluded_is_no_point_and_a_tool_begins_again(history: Shop) -> None:
     frozen(history, 11, 200, excluded=[{"first": 60, "last": 64, "reason": "Chip"}], quantity="without_corrections")
     with history.server.database.begin() as session:
         current = characteristic_named(session, history.characteristic)

@@ -362,7 +362,7 @@ class TestCompensated:
         codes = [each["code"] for each in preview(turned, last_sequence=120)["cautions"]]
         assert "corrected" in codes
 
-    def test_residuals_find_the_wear_and_start_anew_with_each_edge(self, turned: Shop) -> None:
+    def test_residuals_find_the_wear_and_start_again_with_each_edge(self, turned: Shop) -> None:
         made = frozen(turned, 21, 120, quantity="wear_residuals")
         assert made["wear_per_reading"] * 1000 == pytest.approx(0.5, abs=0.01)
         assert made["sigma"] * 1000 == pytest.approx(0.4, rel=0.25)

@@ -198,7 +198,7 @@ def test_the_signal_path_is_the_floor_of_the_advice(shop: Shop) -> None:
     assert told["remedy"]["zero_range"] is None or told["remedy"]["zero_range"] >= 0.0049
 
 
-def test_the_outlook_is_what_the_numbers_say_and_is_made_anew_only_where_something_moved(shop: Shop) -> None:
+def test_the_outlook_is_what_the_numbers_say_and_is_made_again_only_where_something_moved(shop: Shop) -> None:
     cut(shop, scatter(40, sigma=0.1, wear=0.2), delay=0)
     go(shop)
     noted = outlook(shop)

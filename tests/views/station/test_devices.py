@@ -104,7 +104,7 @@ class TestBinding:
         assert rows
         assert not [row for row in rows if token in row or tablet.code.replace("-", "") in row]
 
-    def test_whoever_is_signed_in_on_it_is_signed_out(self, server: Server, shop: Shop) -> None:
+    def test_anyone_who_is_signed_in_on_it_is_signed_out(self, server: Server, shop: Shop) -> None:
         person = Person(server, "admin")
         text = person.send("/setup/stations", machine=shop.machine, name="Tablet")
         code = re.search(r"<code[^>]*>([A-Z2-9-]+)</code>", text)

@@ -46,7 +46,7 @@ _KEY = re.compile(r"[0-9a-f]{16}", re.ASCII)
 
 
 class SheetLine(NamedTuple):
-    """A characteristic on the sheet. sections: so many sizes it takes; 0: touches of a probe are needed."""
+    """A characteristic on the sheet. sections: the number of sizes that it takes; 0: touches of a probe are needed."""
 
     entry: Entry
     name: str
@@ -117,7 +117,7 @@ def sheet_of(session: Session, machine: Machine, drawing: str | None = None, onl
 
 
 def sections_of(parameters: Parameters) -> int:
-    """So many sizes a person types for one reading; 0 where only touches of a probe will do.
+    """The number of sizes that a person types for one reading; 0 where only touches of a probe will do.
 
     Acceptance by n of m takes the m sections, as single touches; distances of two points and repeats take a probe.
     """

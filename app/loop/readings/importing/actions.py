@@ -108,7 +108,7 @@ def _all_good(parsed_lines: Iterable[Line | Flaw | Passed], progress: Progress) 
         if len(wanted) > MOST_LIVE:
             raise Invalid(
                 _("Live, at most {most} lines are imported at once.").format(most=MOST_LIVE),
-                _("Nothing was imported. So many readings at once are history: import them without --live."),
+                _("Nothing was imported. This many readings at once are history: import them without --live."),
             )
     if wrong:
         raise Flawed(flaws, wrong)

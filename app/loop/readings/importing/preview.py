@@ -25,7 +25,7 @@ class PreviewLine(NamedTuple):
 
 
 class Preview(NamedTuple):
-    """checked: so many lines were looked at, None for all of them."""
+    """checked: the number of lines that were looked at, None for all of them."""
 
     shown: list[PreviewLine]
     summary: Summary | None

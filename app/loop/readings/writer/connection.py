@@ -105,7 +105,7 @@ class WriterConnection:
                 await self.pipeline.run(((statement,),))
 
     def answer_by(self, deadline: float, *, at_least: float) -> None:
-        """Limit the wait for the next answer: until the deadline (`monotonic`), and at least so many seconds."""
+        """Limit the wait for the next answer: until the deadline (`monotonic`), and at least N seconds."""
         assert self.pipeline is not None
         self.pipeline.until = asyncio.get_running_loop().time() + max(deadline - monotonic(), at_least)
 

@@ -330,7 +330,7 @@ def _signal(
     if signal is ReadingAlarm.ACCEPTANCE and results is not None:
         active.data |= {
             "m": parameters.accept_m,
-            "least": parameters.accept_m - parameters.accept_n + 1,  # so many outside, and it is rejected
+            "least": parameters.accept_m - parameters.accept_n + 1,  # that many outside, and it is rejected
             "outside": results.sections_outside,
             "target": parameters.target,
         }

@@ -69,7 +69,7 @@ def window_of(
     period: Period = ALWAYS,
     usable: bool = False,
 ) -> Window:
-    """The readings first … through; of them the `last` so many; of them those measured in the period.
+    """The readings first … through; of them the newest `last`; of them those measured in the period.
 
     usable: where nobody has asked for a number: neither excluded readings nor probe faults count for `last`, up to `MOST_COUNTED`, so that an index of the last
     1000 stays one of 1000 readings when somebody excludes one.
@@ -89,7 +89,7 @@ def window_of(
 
 
 def _last_usable(session: Session, characteristic: Characteristic, low: int, high: int, last: int) -> int:
-    """The reading that begins the last so many usable ones of low … high."""
+    """The reading that begins the last N usable ones of low … high."""
     if not 0 < last <= min(MOST_COUNTED, high - low):
         return high - last + 1
     excluded = exists().where(

@@ -23,7 +23,7 @@ from app.web.theme import ZONE_SYMBOLS, zone_name, zone_role
 Floats = NDArray[np.float64]
 
 BARS_PER_SIDE = 15  # whole bars between target and tolerance limit, so that the limits fall between bars
-REACH = 1.4  # the histogram ends at so many times the tolerance; what lies further out is in the two end bars
+REACH = 1.4  # the histogram ends at this many times the tolerance; what lies further out is in the two end bars
 WHOLE_BARS = round(BARS_PER_SIDE * REACH)  # on each side of the target
 BEYOND_NATURAL = 3  # bars beyond a natural limit, where nothing but the scatter of measuring is
 JOINED = 300  # readings, of more a line only hides them, and over a night none would be true

@@ -34,7 +34,7 @@ __all__ = ["Block", "Point", "Step", "zone_chart"]
 
 WIDE = 1500  # pixels from which on there is room for a larger font
 NARROW = 640  # pixels below which there is room for the name and value of a limit only
-MANY = 300  # readings, of more the eye is led by the envelope of so many neighbours that there are GROUPS of them
+MANY = 300  # readings, of more the eye is led by the envelope of as many neighbours that there are GROUPS of them
 GROUPS = 150
 WORD = 70  # pixels that a value in the chart takes
 EVENTS, READINGS, OFFSETS = (0.935, 1.0), (0.165, 0.93), (0.0, 0.135)  # of the height, from the bottom

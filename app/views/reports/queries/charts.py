@@ -19,12 +19,12 @@ def chart(frame: Frame) -> Section | None:
     content, picture = zones(frame, *WIDE)
     sentences = [_("Judged by the limits in force now; every band is equally tall, linear inside.")]
     if content.blocks:
-        sentences.append(_("So many readings are drawn as blocks with their extremes; no extreme is left out."))
+        sentences.append(_("This many readings are drawn as blocks with their extremes; no extreme is left out."))
     return Section("chart", _("Zone chart"), sentences=tuple(sentences), pictures=(picture,))
 
 
 def zones(frame: Frame, width: int, height: int) -> tuple[Chart, Picture]:
-    """The zone chart of the readings, so many pixels wide and high."""
+    """The zone chart of the readings, N pixels wide and high."""
     content = chart_of(frame.session, frame.current, frame.window)
     figure = zone_chart(
         content.points,

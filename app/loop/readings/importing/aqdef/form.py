@@ -29,7 +29,7 @@ HOW = ("timezone", "unit", "dates", "encoding", "machine")
 
 @dataclass
 class Form:
-    """The preview. checked: so many values were looked at, None for all."""
+    """The preview. checked: the number of values that were looked at, None for all."""
 
     said: dict[str, str]
     description: Description | None = None
