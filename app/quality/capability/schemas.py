@@ -311,7 +311,6 @@ def capability_out(study: Study) -> CapabilityOut:
         lower_limit=study.limits.lower,
         upper_limit=study.limits.upper,
         one_sided=wording.one_sided(study),
-        versions=[InForceOut(**_fields(version)) for version in study.versions],
         mean=result.mean if result else None,
         sigma_within=result.within.value if result else None,
         sigma_overall=result.overall.value if result else None,
@@ -333,21 +332,12 @@ def capability_out(study: Study) -> CapabilityOut:
             NormalityOut.of("shapiro_wilk", study.shapiro),
         ],
         stability=wording.stability(study.stability, study.baseline),
-        signals=[
-            FiredOut(rule=fired.rule.value, signals=fired.signals, expected=fired.expected, p_value=fired.p_value)
-            for fired in (judged.fired if judged else ())
-        ],
+        signals=judged.fired if judged else (),
         in_time=_in_time(study, model) if model else None,
-        tolerance_interval=None
-        if isinstance(study.tolerance, Refused)
-        else answer_from(ToleranceIntervalOut, study.tolerance, method=study.tolerance.method.value),
+        tolerance_interval=None if isinstance(study.tolerance, Refused) else study.tolerance,
         without=_without(study),
         cautions=wording.cautions(study),
     )
-
-
-def _fields(given: Any) -> dict[str, Any]:
-    return {name: getattr(given, name) for name in given.__slots__}
 
 
 def _fit(fit: Fit) -> dict[str, Any]:
@@ -382,13 +372,9 @@ def _quoted(study: Study) -> QuotedOut | None:
 
 
 def _in_time(study: Study, in_time: InTime) -> InTimeOut:
-    return InTimeOut(
-        model=in_time.model.value,
-        location=in_time.location.value,
-        scatter_changes=in_time.scatter_changes,
-        share_between=in_time.share_between,
-        slope=in_time.slope,
-        subgroups=in_time.subgroups,
+    return answer_from(
+        InTimeOut,
+        in_time,
         tests=[
             TestOut(question=question, test=test, numbers=numbers, answer=answer)
             for question, test, numbers, answer in wording.model_tests(in_time)

@@ -7,6 +7,7 @@ first one after it; so a point is the same whichever window shows it, as long as
 
 from collections.abc import Iterable
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,7 +17,7 @@ from sqlalchemy.orm import Session
 from app.core.spc import cusum, ewma, rules, shewhart
 from app.core.spc.quantity import Quantity, Series
 from app.core.spc.refusal import Floats
-from app.core.spc.rules import RULES, RuleName, Signals
+from app.core.spc.rules import RULES, RuleName
 from app.core.spc.shewhart import Chart, ControlChart
 from app.core.spc.spread import Subgroups
 from app.errors import FieldError, Invalid
@@ -162,25 +163,41 @@ def _view(points: Charted, kind: Chart, chart: ControlChart | None, kept: NDArra
         points.first[kept],
         points.last[kept],
         points.sizes[kept],
-        np.zeros(0) if chart is None else chart.points,
+        np.zeros(0),
         points.begins[kept],
         waiting=points.waiting,
         settling=points.settling,
         left_out=points.read.left_out,
     )
-    if chart is None:
-        return view
+    return view if chart is None else _judged(view, chart, points.baseline)
+
+
+def _judged(view: View, chart: ControlChart, baseline: Baseline) -> View:
+    """The view with the points and limits of its chart, and signals of the limits alone."""
     return replace(
         view,
+        points=chart.points,
         centre=chart.centre,
         lower=chart.lower,
         upper=chart.upper,
-        signals=_limits_only(chart, _restarts(points.baseline, view.first)),
+        signals=rules.signals_of(chart, [RULES[RuleName.NELSON_1]], _restarts(baseline, view.first)),
     )
 
 
-def _limits_only(chart: ControlChart, restarts: Iterable[int]) -> Signals:
-    return rules.signals_of(chart, [RULES[RuleName.NELSON_1]], restarts)
+def _neighbours(
+    kind: Chart, points: Charted, series: Series, shown: NDArray[np.bool_], window: Window, readings: int = 1
+) -> View:
+    """Points that end at these readings of a series, before they are judged. readings: of each."""
+    return View(
+        kind,
+        Quantity(points.baseline.quantity),
+        *(series.sequence[shown],) * 2,
+        np.full(int(shown.sum()), readings),
+        np.zeros(0),
+        series.begins[shown],
+        settling=_settling(points, window),
+        left_out=points.read.left_out,
+    )
 
 
 def _restarts(baseline: Baseline, first: Whole) -> list[int]:
@@ -201,28 +218,12 @@ def _moving_ranges(points: Charted, window: Window) -> View:
     neighbours = ~series.begins
     for at in (0, np.searchsorted(series.sequence, points.baseline.first_sequence)):
         neighbours[at : at + 1] = False
-    empty = View(
-        Chart.MOVING_RANGE,
-        Quantity(points.baseline.quantity),
-        *(series.sequence[neighbours],) * 2,
-        np.full(int(neighbours.sum()), 2),
-        np.zeros(0),
-        series.begins[neighbours],
-        settling=_settling(points, window),
-        left_out=points.read.left_out,
-    )
+    empty = _neighbours(Chart.MOVING_RANGE, points, series, neighbours, window, 2)
     if not neighbours.any():
         return empty
     whole = shewhart.moving_ranges(judged_by(points.baseline), series.values)
     chart = replace(whole, points=whole.points[neighbours[1:]], z=whole.z[neighbours[1:]])
-    return replace(
-        empty,
-        points=chart.points,
-        centre=chart.centre,
-        lower=chart.lower,
-        upper=chart.upper,
-        signals=_limits_only(chart, _restarts(points.baseline, empty.first)),
-    )
+    return _judged(empty, chart, points.baseline)
 
 
 def _within(points: Charted, kind: Chart) -> View:
@@ -245,42 +246,20 @@ def _remembering(
     sequence, values = series.sequence, series.values
     pieces = [part for part in np.split(values, _restarts(baseline, sequence)) if len(part)]
     inside = sequence >= window.first
-    view = View(
-        kind,
-        Quantity(baseline.quantity),
-        *(sequence[inside],) * 2,
-        np.ones(int(inside.sum()), np.int64),
-        np.zeros(0),
-        series.begins[inside],
-        settling=_settling(points, window),
-        left_out=points.read.left_out,
-    )
+    view = _neighbours(kind, points, series, inside, window)
     if not inside.any():
         return view
     if kind is Chart.CUSUM:
         return _sums(view, baseline, pieces, inside)
     charts = [_averaged(baseline, kind, part) for part in pieces]
     count = [len(part) for part in pieces]
-    lower, upper = (
-        np.concatenate([np.broadcast_to(getattr(part, name), n) for part, n in zip(charts, count, strict=True)])
-        for name in ("lower", "upper")
-    )
-    z = np.concatenate([part.z for part in charts])[inside]
-    together = replace(
-        charts[0],
-        points=np.concatenate([part.points for part in charts])[inside],
-        lower=lower[inside],
-        upper=upper[inside],
-        z=z,
-    )
-    return replace(
-        view,
-        points=together.points,
-        centre=together.centre,
-        lower=together.lower,
-        upper=together.upper,
-        signals=_limits_only(together, _restarts(baseline, view.first)),
-    )
+    together: dict[str, Any] = {
+        name: np.concatenate([np.broadcast_to(getattr(part, name), n) for part, n in zip(charts, count, strict=True)])[
+            inside
+        ]
+        for name in ("points", "lower", "upper", "z")
+    }
+    return _judged(view, replace(charts[0], **together), baseline)
 
 
 def _singly(baseline: Baseline) -> Baseline:

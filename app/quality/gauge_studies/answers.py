@@ -7,7 +7,7 @@ from typing import Any, Literal
 from pydantic import BaseModel, Field
 
 from app.core.spc.gauge.crossed import Study
-from app.core.spc.gauge.linearity import Coefficient, Linearity
+from app.core.spc.gauge.linearity import Linearity
 from app.core.spc.gauge.single import Bias, TypeOne
 from app.core.spc.refusal import Refused
 from app.loop.warnings.wording import sentence
@@ -167,8 +167,8 @@ def study_out(row: StudyRow, advice: Advice | Refused | None) -> StudyOut:
         settings=row.settings,
         rows=row.revision.rows,
         refused=wording.refusal(evaluation.refused) if evaluation.refused else None,
-        bias=_bias(evaluation.bias) if isinstance(evaluation.bias, Bias) else None,
-        type_one=_type_one(evaluation.type_one) if isinstance(evaluation.type_one, TypeOne) else None,
+        bias=answer_from(BiasOut, evaluation.bias) if isinstance(evaluation.bias, Bias) else None,
+        type_one=answer_from(TypeOneOut, evaluation.type_one) if isinstance(evaluation.type_one, TypeOne) else None,
         linearity=_linearity(evaluation.linearity) if isinstance(evaluation.linearity, Linearity) else None,
         grr=_crossed(evaluation, row.tolerance),
         values_left_out=evaluation.cut,
@@ -176,9 +176,7 @@ def study_out(row: StudyRow, advice: Advice | Refused | None) -> StudyOut:
             GaugeVerdictOut(name=verdict.name, value=verdict.value, verdict=verdict.word, limit=verdict.limit)
             for verdict in wording.verdicts(evaluation, row.tolerance)
         ],
-        zero_range=AdviceOut(
-            zero_range=advice.suggestion.zero_range, fits=advice.suggestion.fits, reasoning=wording.advice(advice)
-        )
+        zero_range=answer_from(AdviceOut, advice.suggestion, reasoning=wording.advice(advice))
         if isinstance(advice, Advice)
         else None,
         taken_from=wording.taken_from(row.settings["source"], row.characteristic) if "source" in row.settings else None,
@@ -187,26 +185,9 @@ def study_out(row: StudyRow, advice: Advice | Refused | None) -> StudyOut:
     )
 
 
-def _bias(found: Bias) -> BiasOut:
-    names = ("readings", "mean", "bias", "repeatability", "t", "p_value", "low", "high", "significant")
-    return BiasOut(**{name: getattr(found, name) for name in names})
-
-
-def _type_one(found: TypeOne) -> TypeOneOut:
-    return answer_from(TypeOneOut, found)
-
-
 def _linearity(found: Linearity) -> LinearityOut:
-    def coefficient(c: Coefficient) -> CoefficientOut:
-        return answer_from(CoefficientOut, c)
-
     return answer_from(
-        LinearityOut,
-        found,
-        biases={f"{reference:g}": value for reference, value in found.biases.items()},
-        slope=coefficient(found.slope),
-        intercept=coefficient(found.intercept),
-        biased_at=list(found.biased_at),
+        LinearityOut, found, biases={f"{reference:g}": value for reference, value in found.biases.items()}
     )
 
 
@@ -227,13 +208,10 @@ def _crossed(found: Evaluation, tolerance: float | None) -> list[CrossedOut]:
             ],
             zeroed=["reproducibility" if name == "appraiser" else name for name in study.zeroed],
             table=[
-                VarianceLineOut(
-                    source=line.source,
-                    freedom=line.freedom,
-                    squares=line.squares,
-                    mean_square=_number(line.mean_square),
-                    f=_number(line.f),
-                    p_value=_number(line.p_value),
+                answer_from(
+                    VarianceLineOut,
+                    line,
+                    **{name: _number(getattr(line, name)) for name in ("mean_square", "f", "p_value")},
                 )
                 for line in study.table
             ],

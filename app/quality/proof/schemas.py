@@ -6,6 +6,7 @@ from pydantic import BaseModel, Field
 
 from app.quality.proof.cases import Basis
 from app.quality.proof.queries import Check, Proof, Result
+from app.web.fields import answer_from
 
 Number = float | bool
 Numbers = Number | list[Number]
@@ -25,14 +26,7 @@ class CheckOut(BaseModel):
     def of(cls, check: Check) -> "CheckOut":
         """From what the proof found."""
         difference = check.difference
-        return cls(
-            name=check.name,
-            expected=check.expected,
-            got=check.got,
-            tolerance=check.tolerance,
-            difference=None if difference is None or isnan(difference) else difference,
-            passed=check.passed,
-        )
+        return answer_from(cls, check, difference=None if difference is None or isnan(difference) else difference)
 
 
 class ExampleOut(BaseModel):
@@ -55,12 +49,9 @@ class ExampleOut(BaseModel):
     @classmethod
     def of(cls, result: Result) -> "ExampleOut":
         """From what the proof found."""
-        return cls(
-            kind=result.case.kind,
-            name=result.case.name,
-            source=result.case.source,
-            basis=result.case.basis,
-            note=result.case.note,
+        return answer_from(
+            cls,
+            result.case,
             passed=result.passed,
             error=result.error,
             checks=[CheckOut.of(check) for check in result.checks],
@@ -79,10 +70,10 @@ class ProofOut(BaseModel):
     @classmethod
     def of(cls, proof: Proof) -> "ProofOut":
         """From what the proof found."""
-        return cls(
-            passed=proof.passed,
+        return answer_from(
+            cls,
+            proof,
             examples=len(proof.results),
             failing=len(proof.failing),
-            numbers=proof.numbers,
             results=[ExampleOut.of(result) for result in proof.results],
         )
