@@ -105,7 +105,7 @@ class EffectTally:
 class PendingTool:
     """A location of the tool memory as these readings move it. mm.
 
-    tallies: worked out of `corrections`. none_held: so many of the first of them are known not to be held.
+    tallies: worked out of `corrections`. none_held: that many of the first of them are known not to be held.
     """
 
     machine_id: int
