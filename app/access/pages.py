@@ -178,6 +178,7 @@ def send_password(request: Request, session: SessionDep, caller: AnyCaller, form
             errors = by_field(error)
         else:
             return RedirectResponse(f"/account?done={'password-pin' if had_pin else 'password'}", 303)
+    session.commit()  # a wrong password is counted, although the page refuses
     return _account(request, session, caller, errors, status=422)
 
 
@@ -199,6 +200,7 @@ def send_pin(request: Request, session: SessionDep, caller: AnyCaller, form: For
             errors = by_field(error)
         else:
             return RedirectResponse(f"/account?done={'pin' if pin else 'no-pin'}", 303)
+    session.commit()  # a wrong password is counted, although the page refuses
     return _account(request, session, caller, errors, status=422)
 
 

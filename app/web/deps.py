@@ -44,7 +44,10 @@ FROM_REPLICA = cast("params.Depends", Depends(may_read_replica))
 
 
 def get_session(request: Request) -> Iterator[Session]:
-    """One transaction for the request, committed before the answer leaves; on the copy of the database, nothing but reading."""
+    """One transaction for the request, committed before the answer leaves; on the copy of the database, nothing but reading.
+
+    A page that refuses (`app.web.templates.page` with a status of 400 and more) keeps nothing of what was begun.
+    """
     replica: Replica | None = request.app.state.replica
     if replica is not None and getattr(request.state, "may_read_replica", False):
         wanted = _must_see(request)
@@ -57,6 +60,8 @@ def get_session(request: Request) -> Iterator[Session]:
     database: Database = request.app.state.database
     with database.begin() as session:
         yield session
+        if getattr(request.state, "refused", False):
+            session.rollback()
 
 
 def get_door_session(request: Request) -> Iterator[Session]:

@@ -171,9 +171,13 @@ def page(
     headers: dict[str, str] | None = None,
     **context: Any,
 ) -> HTMLResponse:
-    """A whole page, or the part of one, as an answer. Pages show the state of now, so nobody keeps them."""
+    """A whole page, or the part of one, as an answer. Pages show the state of now, so nobody keeps them.
+
+    With a status of 400 and more nothing that the request has written is kept.
+    """
     headers = dict(headers or {})
     if status >= HTTPStatus.BAD_REQUEST:
+        request.state.refused = True
         for refusal in context.values():
             if isinstance(refusal, InbandError):
                 note_reason(request.scope, refusal)

@@ -1,13 +1,19 @@
-"""Templates are compiled once, however many pages need them at once."""
+"""Templates are compiled once, however many pages need them at once; a page that refuses keeps nothing."""
 
 from collections.abc import MutableMapping
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import contextmanager
 from threading import Barrier, Event
+from types import SimpleNamespace
 from typing import Any
 
+from fastapi import Request
 from jinja2 import DictLoader, Environment, Template
+from sqlalchemy import text
 
-from app.web.templates import OneByOne
+from app.db.engine import Database
+from app.web.deps import get_session
+from app.web.templates import OneByOne, page
 
 PAGES = 8
 
@@ -42,3 +48,20 @@ def test_pages_that_come_at_once_compile_a_template_once() -> None:
     with ThreadPoolExecutor(PAGES) as pool:
         assert list(pool.map(read, range(PAGES))) == ["read"] * PAGES
     assert loader.count == 1
+
+
+def test_a_page_that_refuses_keeps_nothing_of_its_request(database: Database) -> None:
+    """An action that has written before it refuses is undone, whoever draws the form again."""
+    app = SimpleNamespace(state=SimpleNamespace(replica=None, database=database))
+    with database.begin() as session:
+        session.execute(text("CREATE TABLE written (status int)"))
+    for status in (200, 422, 409, 404, 200):
+        request = Request(
+            {"type": "http", "method": "POST", "path": "/", "query_string": b"", "headers": [], "app": app}
+        )
+        with contextmanager(get_session)(request) as session:
+            session.execute(text("INSERT INTO written VALUES (:status)"), {"status": status})
+            page(request, Template("the form"), status=status)
+    with database.begin() as session:
+        kept = list(session.scalars(text("SELECT status FROM written")))
+    assert kept == [200, 200]
