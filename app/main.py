@@ -130,6 +130,7 @@ from app.views.search import readings_api as reading_list
 from app.views.set_up import pages as setup_pages
 from app.views.shift import api as shift
 from app.views.shift import pages as shift_pages
+from app.views.shift.mail import shift_words
 from app.views.station import pages as station_pages
 from app.views.to_do import pages as to_do_pages
 from app.views.to_do.queries import COUNT as TO_DO_COUNT
@@ -365,7 +366,7 @@ def create_plant(settings: Settings, prefix: str = "") -> Application:
     replica = _replica(settings, database, waits.labels("replica").observe)
     keys, directory = KeyRing(doors, caller_of_key), Directory(doors)
     writer, live, jobs = Writer(database), Live(connections, still_granted), JobRunner(background, jobs_of(settings))
-    report_worker, notifier = ReportWorker(background, replica), Notifier(background, settings)
+    report_worker, notifier = ReportWorker(background, replica), Notifier(background, settings, shift_words)
 
     @asynccontextmanager
     async def lifespan(_app: FastAPI) -> AsyncIterator[None]:

@@ -98,6 +98,7 @@ BODIES: dict[str, dict[str, Any]] = {
         "address": "anna@example.com",
         "quiet": [NIGHT],
         "away_until": "2026-11-21T08:15:02Z",
+        "shift_report": True,
     },
     "POST /api/v1/readings/aqdef": {"name": "bad.dfq", "content": AQDEF},
     "POST /api/v1/readings/table": {

@@ -116,11 +116,20 @@ def _last_event(session: Session) -> int:
 
 
 def change_receiver(
-    session: Session, number: int, change: ReceiverChange, caller: Caller, settings: Settings
+    session: Session,
+    number: int,
+    change: ReceiverChange,
+    caller: Caller,
+    settings: Settings,
+    before: dict[str, Any] | None = None,
 ) -> Receiver:
-    """Change what is named. Raises `NotFound`; `Invalid` for an address that is not permitted."""
+    """Change what is named. before: as it was, where something of it has changed already.
+
+    Raises `NotFound`; `Invalid` for an address that is not permitted.
+    """
+    session.flush()
     row = queries.receiver(session, number, hold=True)
-    before, named = _facts(row), change.model_fields_set
+    before, named = before or _facts(row), change.model_fields_set
     if change.address is not None and change.address != row.address:
         _permitted(row.means, change.address, settings)
         row.address, row.failures, row.retry_at = change.address, 0, None
@@ -174,7 +183,7 @@ def _facts(row: Receiver) -> dict[str, Any]:
         "quiet": row.quiet,
         "away_until": row.away_until.isoformat() if row.away_until else None,
         "events": row.events,
-    }
+    } | ({"shift_report": row.shift_report} if row.person_id is not None else {})
 
 
 # --- one's own address
@@ -186,9 +195,13 @@ def set_own(session: Session, given: OwnAddressIn, caller: Caller, settings: Set
         raise NotFound(_("A key is no person and has no mail address."), _("Sign in as a person."))
     people.hold_person(session, {"person": caller.person_id})  # of two at once, one comes second
     row = queries.own(session, caller.person_id)
+    reported = datetime.now(UTC) if given.shift_report else None
     if row is not None:
+        if given.shift_report and not row.shift_report:
+            row.shift_reported = reported
+        before, row.shift_report = _facts(row), given.shift_report
         change = ReceiverChange(address=given.address, quiet=given.quiet, away_until=given.away_until)
-        return change_receiver(session, row.id, change, caller, settings)
+        return change_receiver(session, row.id, change, caller, settings, before)
     _permitted("mail", given.address, settings)
     given_quiet = [each.model_dump() for each in given.quiet]
     return _added(
@@ -201,6 +214,8 @@ def set_own(session: Session, given: OwnAddressIn, caller: Caller, settings: Set
             person_id=caller.person_id,
             quiet=given_quiet,
             away_until=given.away_until,
+            shift_report=given.shift_report,
+            shift_reported=reported,
         ),
     )
 

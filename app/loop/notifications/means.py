@@ -12,6 +12,7 @@ from collections.abc import Callable
 from contextlib import suppress
 from contextvars import copy_context
 from dataclasses import dataclass, field
+from datetime import datetime
 from email.message import EmailMessage
 from email.utils import formatdate
 from functools import cache
@@ -51,7 +52,7 @@ class Message:
 
 @dataclass(frozen=True, slots=True)
 class Job:
-    """A delivery to be made. delivery: its number. cursor: the last event in it, of one about changes."""
+    """A delivery to be made. delivery: its number. cursor: the last event in it, of one about changes; shift_end: of a shift."""
 
     delivery: int
     receiver: int
@@ -62,6 +63,7 @@ class Job:
     message: Message
     alarms: tuple[int, ...] = ()
     cursor: int | None = None
+    shift_end: datetime | None = None
 
 
 async def deliver(job: Job, settings: Settings) -> Answer:

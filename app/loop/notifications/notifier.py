@@ -34,8 +34,10 @@ END_WITHIN = 3.0  # s for what is being delivered when the server ends; it is se
 class Notifier:
     """Sends notifications in one process."""
 
-    def __init__(self, database: Database, settings: Settings) -> None:
+    def __init__(self, database: Database, settings: Settings, shift_report: sending.ShiftReport) -> None:
+        """shift_report: words about a shift, which people may want by mail."""
         self._database = database
+        self._shift_report = shift_report
         self._settings = settings
         self._days_off = frozenset(date.fromisoformat(day) for day in settings.days_off.split(",") if day)
         self._threads = ThreadPoolExecutor(2, thread_name_prefix="notifications")  # never those of the readings door
@@ -78,8 +80,12 @@ class Notifier:
                 await asyncio.wait_for(self._closing.wait(), EVERY)
 
     async def look(self) -> None:
-        """Begin what is due."""
-        for job in await self._in_thread(self._plan):
+        """Begin what is due; alarms do not wait for the words about a shift."""
+        for plan in (self._plan, self._plan_shifts):
+            self._begin(await self._in_thread(plan))
+
+    def _begin(self, jobs: list[Job]) -> None:
+        for job in jobs:
             task = asyncio.get_running_loop().create_task(self._deliver(job), name=f"delivery {job.delivery}")
             self._deliveries.add(task)
             task.add_done_callback(self._deliveries.discard)
@@ -104,6 +110,10 @@ class Notifier:
     def _plan(self) -> list[Job]:
         with self._database.begin() as session:
             return sending.plan(session, self._settings.address, self._days_off)
+
+    def _plan_shifts(self) -> list[Job]:
+        with self._database.begin() as session:
+            return sending.plan_shifts(session, self._settings.address, self._shift_report)
 
     def _end(self, job: Job, answer: Answer) -> None:
         with self._database.begin() as session:

@@ -172,6 +172,11 @@ class ReceiverChange(Body):
     events: Annotated[list[Changes] | None, Field(max_length=4, description="Of a webhook.")] = None
 
 
+AtEndOfShift = Annotated[
+    bool, Field(description="A report by mail at the end of each shift in which something happened.")
+]
+
+
 class OwnAddressIn(Body):
     """One's own mail address for notifications."""
 
@@ -180,6 +185,7 @@ class OwnAddressIn(Body):
         default_factory=list
     )
     away_until: Annotated[Moment | None, Field(description="Nothing is sent before.")] = None
+    shift_report: AtEndOfShift = False
 
 
 class ReceiverOut(BaseModel):
@@ -196,6 +202,7 @@ class ReceiverOut(BaseModel):
     failures: Annotated[int, Field(description="Failures in a row; 0: the last message arrived.")]
     retry_at: Annotated[datetime | None, Field(description="It is not tried again before.")]
     last_at: Annotated[datetime | None, Field(description="When a message about alarms was delivered last.")]
+    shift_report: AtEndOfShift
     created_at: datetime
     created_by: Annotated[str, Field(description="Who added it.")]
 
@@ -223,7 +230,7 @@ class DeliveryOut(BaseModel):
 
     id: int
     receiver: Annotated[int, Field(description="Number of the receiver.")]
-    about: Annotated[Literal["alarms", "changes", "test"], Field(description="Its content.")]
+    about: Annotated[Literal["alarms", "changes", "test", "shift"], Field(description="Its content.")]
     subject: Annotated[str, Field(description="Its heading.")]
     alarms: Annotated[list[int], Field(description="Numbers of the alarms in it.")]
     changes: Annotated[int, Field(description="How many changes are in it.")]

@@ -4,7 +4,7 @@ One process plans at a time. A delivery that it has begun is its own until `BUSY
 in it is sent again.
 """
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from datetime import date, datetime, timedelta
 from typing import Any
 
@@ -17,7 +17,7 @@ from app.core import notify
 from app.core.notify import Notice, Raised, Record, notices, pause_after
 from app.db.events import publish
 from app.db.tables import Event
-from app.language.times import plant_zone
+from app.language.times import end_of_shift, plant_zone
 from app.loop.alarm_response.queries import AlarmRow, alarm
 from app.loop.alarms.kinds import kind_named
 from app.loop.notifications import message
@@ -33,6 +33,7 @@ KEPT = timedelta(days=31)
 """Time that deliveries stay on record, and what was announced."""
 CHATTER = timedelta(days=7)
 """As far back as the same alarm is looked for: the longest hold-off."""
+SETTLED, OLDEST_SHIFT = timedelta(minutes=5), timedelta(hours=24)
 MOST_ALARMS = 5_000
 MOST_AT_ONCE = 16
 """Messages about alarms that are begun in one look; the others are begun in the next one."""
@@ -70,6 +71,47 @@ def plan(session: Session, address: str, days_off: frozenset[date]) -> list[Job]
     for job in jobs:
         rows[job.receiver].busy_until = now + BUSY
     return jobs
+
+
+ShiftReport = Callable[[Session, datetime, str], tuple[str, str] | None]
+"""Subject and text about the shift that ends at a moment, with links to this address; None where nothing happened in it."""
+
+
+def plan_shifts(session: Session, address: str, report: ShiftReport) -> list[Job]:
+    """Begin the mails about shifts that have ended: to each person who wants them the oldest that is due, none twice.
+
+    A shift is due once `SETTLED` has gone by, for what comes late; after `OLDEST_SHIFT` it is due no more.
+    """
+    wants = select(Receiver).where(
+        Receiver.deleted_at.is_(None), Receiver.shift_report, Receiver.person_id.not_in(WITHOUT_ACCESS)
+    )
+    rows = session.scalars(wants.order_by(Receiver.id)).all()
+    if not rows or not session.scalar(_PLANNING):
+        return []
+    now: datetime = session.scalars(select(func.clock_timestamp())).one()
+    made: dict[datetime, tuple[str, str] | None] = {}
+    jobs: list[Job] = []
+    for row in rows:
+        end = end_of_shift(max(row.shift_reported or row.created_at, now - OLDEST_SHIFT))
+        if end + SETTLED > now or len(jobs) >= MOST_AT_ONCE or not _may_have(row, now):
+            continue
+        if end not in made:
+            made[end] = report(session, end, address)
+        words = made[end]
+        if words is None:
+            row.shift_reported = end
+            continue
+        jobs.append(_job(session, row, "shift", Message(*words, {"type": "shift"}), shift_end=end))
+        row.busy_until = now + BUSY
+    return jobs
+
+
+def _may_have(row: Receiver, now: datetime) -> bool:
+    """Tell if a receiver can be tried now, and takes what is not urgent."""
+    if any(until is not None and until > now for until in (row.busy_until, row.retry_at)):
+        return False
+    quiet = week(map(HoursIn.model_validate, row.quiet))
+    return notify.Receiver(row.id, quiet, row.away_until).listens(now, now.astimezone(plant_zone()), urgent=False)
 
 
 def _give_up(session: Session, now: datetime) -> None:
@@ -242,6 +284,8 @@ def end(session: Session, job: Job, answer: Answer) -> None:
 def _arrived(session: Session, row: Receiver, job: Job, now: datetime) -> None:
     if job.cursor is not None:
         row.cursor = max(row.cursor, job.cursor)
+    if job.shift_end is not None:
+        row.shift_reported = job.shift_end
     if not job.alarms:
         return
     row.last_at = now

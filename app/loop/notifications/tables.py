@@ -46,6 +46,8 @@ class Receiver(Base):
     retry_at: Mapped[datetime | None]
     busy_until: Mapped[datetime | None]  # a delivery is under way; later than that it counts as lost
     last_at: Mapped[datetime | None]  # of the last message about alarms
+    shift_report: Mapped[bool] = mapped_column(server_default="false")  # a mail at the end of each shift
+    shift_reported: Mapped[datetime | None]  # the end of the last shift that is dealt with
     created_at: Mapped[datetime] = mapped_column(server_default=func.now())
     created_by: Mapped[str]
     deleted_at: Mapped[datetime | None]
@@ -82,7 +84,7 @@ class Delivery(Base):
 
     __tablename__ = "delivery"
     __table_args__ = (
-        CheckConstraint("about IN ('alarms', 'changes', 'test')", name="about"),
+        CheckConstraint("about IN ('alarms', 'changes', 'test', 'shift')", name="about"),
         CheckConstraint("state IN ('waiting', 'sending', 'delivered', 'failed', 'lost')", name="state"),
         Index("delivery_open_idx", "receiver_id", postgresql_where=text("state IN ('waiting', 'sending')")),
         Index("delivery_asked_idx", "asked_at"),

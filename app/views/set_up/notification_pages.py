@@ -259,7 +259,11 @@ def send_own(request: Request, session: SessionDep, caller: Viewer, settings: Se
             if form.get("do") == "delete":
                 actions.delete_own(session, caller)
             else:
-                sent = {"address": form.get("address", "").strip(), "quiet": _hours(form, "quiet", EVERY_DAY)}
+                sent: dict[str, Any] = {
+                    "address": form.get("address", "").strip(),
+                    "quiet": _hours(form, "quiet", EVERY_DAY),
+                }
+                sent["shift_report"] = form.get("shift_report") == "true"
                 actions.set_own(session, parsed(OwnAddressIn, sent), caller, settings)
     except InbandError as error:
         if caller.person_id is None:
@@ -281,7 +285,7 @@ def _own(
     if form is None:
         quiet = row.quiet[0] if row and row.quiet else {}
         form = {f"quiet-{name}": quiet.get(name, "") for name in ("begins", "ends")}
-        form |= {"address": row.address if row else ""}
+        form |= {"address": row.address if row else "", "shift_report": "true" if row and row.shift_report else ""}
     return page(
         request,
         "access/notifications.html",

@@ -11,9 +11,12 @@ from types import ModuleType
 from typing import Any
 
 import pytest
-from sqlalchemy import text
+from sqlalchemy import select, text
+from sqlalchemy.orm import Session
 
+from app.access.tables import Person
 from app.db.engine import Database
+from app.language.times import begin_of_shift, end_of_shift
 from app.loop.notifications import means, notifier, sending
 from app.loop.notifications.addresses import Refused, place_of
 from app.loop.notifications.means import Answer, Job, Message, deliver
@@ -513,6 +516,89 @@ class TestSetUp:
         entries = shop.call("GET", f"/audit?subject=receiver/{grace['id']}")["items"]
         assert {each["action"] for each in entries} == {"receiver added", "receiver changed"}
         assert address not in str(entries)
+
+
+class TestShifts:
+    """The mail at the end of a shift."""
+
+    @pytest.fixture
+    def anna(self, session: Session) -> Receiver:
+        """Somebody who wants it, and has had it up to the shift before yesterday's last."""
+        person = Person(name="anna", role="viewer", password_hash="-")
+        session.add(person)
+        session.flush()
+        last = begin_of_shift(datetime.now(UTC) - sending.SETTLED)
+        before = begin_of_shift(last - timedelta(seconds=1))
+        row = Receiver(
+            name="anna",
+            means="mail",
+            address="anna@example.com",
+            person_id=person.id,
+            created_by="anna",
+            shift_report=True,
+            shift_reported=before,
+        )
+        session.add(row)
+        session.flush()
+        session.refresh(row)
+        return row
+
+    @staticmethod
+    def planned(session: Session) -> list[Job]:
+        return sending.plan_shifts(session, "https://inband.test", lambda _s, end, address: (f"until {end}", address))
+
+    def test_it_is_sent_once_and_again_where_it_did_not_arrive(self, session: Session, anna: Receiver) -> None:
+        due = end_of_shift(anna.shift_reported or anna.created_at)
+        (job,) = self.planned(session)
+        assert (job.shift_end, job.message.subject) == (due, f"until {due}")
+        assert self.planned(session) == []  # it is on its way
+        sending.end(session, job, Answer(delivered=False, text="421 not now"))
+        assert self.planned(session) == []  # it pauses, as after every failure
+        anna.retry_at = None
+        session.flush()
+        (again,) = self.planned(session)
+        assert again.shift_end == due
+        sending.end(session, again, Answer(delivered=True, text="250 OK"))
+        assert due not in {job.shift_end for job in self.planned(session)}
+
+    def test_not_in_quiet_hours_not_of_an_empty_shift_and_not_who_does_not_want_it(
+        self, session: Session, anna: Receiver
+    ) -> None:
+        always = {"days": [1, 2, 3, 4, 5, 6, 7], "begins": "00:00", "ends": "00:00"}
+        anna.quiet = [always]
+        session.flush()
+        assert self.planned(session) == []
+        anna.quiet = []
+        reported = anna.shift_reported
+        assert sending.plan_shifts(session, "", lambda _session, _end, _address: None) == []
+        assert anna.shift_reported != reported
+        anna.shift_reported, anna.shift_report = reported, False
+        session.flush()
+        assert self.planned(session) == []
+
+    def test_it_comes_with_the_words_of_the_page(self, plant: InProcess, shop: Shop, mails: tuple[Mails, str]) -> None:
+        name = unique("ben")
+        plant.person(name, "viewer")
+        end = begin_of_shift(datetime.now(UTC) - sending.SETTLED)
+        shop.read(12.0, measured_at=(end - timedelta(minutes=30)).isoformat(), part="p1")
+        address = f"{name}@example.com"
+        with plant.database.begin() as session:
+            ben = session.scalars(select(Person).where(Person.name == name)).one()
+            session.add(
+                Receiver(
+                    name=name,
+                    means="mail",
+                    address=address,
+                    person_id=ben.id,
+                    created_by=name,
+                    shift_report=True,
+                    shift_reported=begin_of_shift(end - timedelta(seconds=1)),
+                )
+            )
+        (mail, *_later) = until(lambda: mails[0].to(address))
+        assert mail.startswith("Shift ")
+        assert "1 out of tolerance" in mail
+        assert "https://inband.test/shift?at=" in mail
 
 
 class TestApprise:

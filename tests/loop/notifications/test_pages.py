@@ -125,6 +125,10 @@ def test_everybody_says_where_they_get_mail(shop: Shop, server: Server) -> None:
     fields: dict[str, Any] = {"address": f"{viewer.name}@example.com", "quiet-begins": "20:00", "quiet-ends": "06:00"}
     assert "Saved." in viewer.send("/account/notifications", **fields)
     mine = viewer.browser.get("/api/v1/notifications/me").json()
+    assert not mine["shift_report"]
+    viewer.send("/account/notifications", **fields, shift_report="true")
+    assert viewer.browser.get("/api/v1/notifications/me").json()["shift_report"]
+    assert "checked" in viewer.open("/account/notifications")
     assert mine["quiet"] == [{"days": [1, 2, 3, 4, 5, 6, 7], "begins": "20:00", "ends": "06:00"}]
     assert receiver_named(shop, viewer.name)["person"] == mine["person"]
     assert "Must be one mail address" in viewer.send("/account/notifications", 422, **fields | {"address": "anna"})
