@@ -18,6 +18,7 @@ only through each other's queries and actions. frontend/ and migrations/ lie bes
         reports          a characteristic and a period as page, PDF, spreadsheet; many at once in the background
         search           readings and parts across characteristics, one field for everything
         compare          several characteristics, versions, tools or periods side by side
+        wall             the wall screen: machines, alarms, parts of the shift, from five metres, by a key of its own
         shift            one shift: parts, alarms and how fast they were acknowledged, corrections, what comes next
         overview         every characteristic ranked by what needs attention, with the reasons
         to_do            everything that waits for a person, with one count

@@ -11,7 +11,7 @@ from prometheus_client import Histogram
 from starlette.middleware.gzip import GZipMiddleware
 
 from app.access import api as people
-from app.access import events_api, keys_api
+from app.access import events_api, keys_api, screens_api
 from app.access import pages as sign_in_pages
 from app.access.audit import api as audit
 from app.access.bodies import read_after_recognition
@@ -134,6 +134,7 @@ from app.views.shift.mail import shift_words
 from app.views.station import pages as station_pages
 from app.views.to_do import pages as to_do_pages
 from app.views.to_do.queries import COUNT as TO_DO_COUNT
+from app.views.wall import pages as wall_pages
 from app.web import api_docs, health
 from app.web.live import Live
 from app.web.openapi import document
@@ -198,6 +199,7 @@ ROUTERS: tuple[APIRouter, ...] = (
     people.router,
     machine_keys.router,
     keys_api.router,
+    screens_api.router,
     audit.router,
     health.router,
     api_docs.router,
@@ -209,6 +211,7 @@ ROUTERS: tuple[APIRouter, ...] = (
     station_pages.router,
     search_pages.router,
     to_do_pages.router,
+    wall_pages.router,
     compare_pages.router,
     overview_pages.router,
     shift_pages.router,
@@ -411,6 +414,7 @@ def create_plant(settings: Settings, prefix: str = "") -> Application:
     app.state.live = live
     app.state.report_worker = report_worker
     app.state.metrics = health.registry(database, settings.data_dir, replica, waits)
+    app.state.wall = wall_pages.WallDoor()
     app.state.waiting = {
         "to_do": TO_DO_COUNT.scalar_subquery(),
     }

@@ -29,7 +29,7 @@ OPEN = {"queries", "actions", "wording", "kinds", "keys", "figures", "pictures",
 """Doors of a room. Wording and figures are pure: values in, sentences and pictures out."""
 OPEN_TO_VIEWS = {"schemas", "confirmation", "verbs", "request", "reader", "outcomes", "answers", "records"}
 """A page that composes rooms takes their forms and answers as well."""
-EVERYBODY = {f"app.access.{name}" for name in ("callers", "deps", "devices", "identification", "sign_in")}
+EVERYBODY = {f"app.access.{name}" for name in ("callers", "deps", "devices", "identification", "screens", "sign_in")}
 """Who calls is a plain value that everybody may speak of; so is how people and devices show who they are."""
 EDGE = {"api", "pages", "schemas", "figures"}
 """These take no tables; what lies behind a door (readings/saving.py) may."""

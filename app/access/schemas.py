@@ -85,3 +85,25 @@ class NewKeyOut(BaseModel):
 def key_out(key: ApiKey) -> KeyOut:
     """Never with its hash."""
     return KeyOut.model_validate(key)
+
+
+class ScreenIn(Body):
+    """A wall screen."""
+
+    name: Annotated[Text200, Field(description="Where it hangs, which tells it apart from others.")]
+
+
+class ScreenOut(BaseModel):
+    """A wall screen, without its key."""
+
+    id: Annotated[int, Field(description="Number of the wall screen.")]
+    name: str
+    created_at: datetime
+    created_by: Annotated[str, Field(description="Who made it.")]
+    last_used_at: Annotated[datetime | None, Field(description="When it last looked, to about a minute; null: never.")]
+
+
+class NewScreenOut(ScreenOut):
+    """A wall screen just made. Its link is shown only this once and stored nowhere."""
+
+    url: Annotated[str, Field(description="The link to open on the screen; behind the # is its key.")]

@@ -129,3 +129,17 @@ class Badge(Base):
     code_hash: Mapped[bytes] = mapped_column(LargeBinary, primary_key=True)
     person_id: Mapped[int] = mapped_column(ForeignKey("person.id"), index=True)
     created_at: Mapped[datetime] = mapped_column(server_default=func.now())
+
+
+class WallScreen(Base):
+    """A screen on the wall: the SHA-256 of the key that opens it, and nothing else."""
+
+    __tablename__ = "wall_screen"
+
+    id: Mapped[int] = mapped_column(Identity(always=True), primary_key=True)
+    secret_hash: Mapped[bytes] = mapped_column(LargeBinary, unique=True)
+    name: Mapped[str]
+    created_at: Mapped[datetime] = mapped_column(server_default=func.now())
+    created_by: Mapped[str]
+    last_used_at: Mapped[datetime | None]  # to the minute
+    revoked_at: Mapped[datetime | None]

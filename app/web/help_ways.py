@@ -26,6 +26,7 @@ _BEHIND: tuple[tuple[str, str], ...] = (
     (r"/characteristics/[^/]+/trial(/.*)?", "how-to/shadow-trial"),
     (r"/ledger", "how-to/ledger"),
     (r"/shift", "how-to/shift"),
+    (r"/wall|/setup/screens", "how-to/wall-screen"),
     (r"/characteristics/[^/]+/what-if|/proposals(/.*)?", "how-to/what-if"),
     (r"/characteristics/[^/]+/report|/reports", "how-to/reports"),
     (r"/characteristics/[^/]+/readings/.*", "reference/decision"),

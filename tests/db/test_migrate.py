@@ -64,6 +64,7 @@ ADDED_TABLES = {
     "job_failure",
     "capability_verdict",
     "station_device",
+    "wall_screen",
     "note",
     "badge",
     "reading_context",

@@ -46,6 +46,7 @@ PASSING = {
     "report_job",
     "report_part",
     "station_device",
+    "wall_screen",
     "watching",
 }
 MOVING = {"average_memory", "machine_state", "stream", "tool"}  # any of their columns but the key may move

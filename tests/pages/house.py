@@ -100,6 +100,8 @@ PAGES = {
     ],
     "/characteristics/{characteristic}/trial/start": ["/characteristics/{characteristic}/trial/start"],
     "/shift": ["/shift", "/shift?machine={machine}", "/shift?at=2020-01-01"],
+    "/wall": ["/wall#{wall_key}"],
+    "/setup/screens": ["/setup/screens"],
     "/ledger": ["/ledger", "/ledger?machine={machine}"],
     "/proposals": ["/proposals", "/proposals?status=all"],
     "/proposals/{number}": ["/proposals/{proposal}"],
@@ -391,5 +393,8 @@ def values_of(shop: Shop) -> dict[str, Any]:
         "alignment": of("alignments")[0]["id"],
         "form": of("forms")[0]["id"],
         "run": of("kinematics/runs")[-1]["run"],
+        "wall_key": shop.call("POST", "/wall-screens", 201, name="Hall with a name as long as halls have them")[
+            "url"
+        ].partition("#")[2],
         "route": shop.call("GET", "/notifications/routes")["items"][-1]["id"],
     }

@@ -111,6 +111,7 @@ BODIES: dict[str, dict[str, Any]] = {
         "missing": ["---"],
         "dry_run": True,
     },
+    "POST /api/v1/wall-screens": {"name": "Hall C"},
     "POST /api/v1/machines": {"key": "mill-bad", "name": "Mill", "control": "heidenhain"},
     "PATCH /api/v1/machines/{machine}": {"name": "Lathe", "control": "fanuc", "corrections_expire_after": 8.0},
     "POST /api/v1/machines/{machine}/keys": {"name": "Second control"},

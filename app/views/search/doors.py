@@ -59,6 +59,7 @@ def doors() -> list[Door]:
         Door(_("Program text"), "/setup/programs", _("read a program, Sinumerik, Fanuc, Heidenhain")),
         Door(_("People"), "/setup/people", _("invite, role, user, password"), "admin"),
         Door(_("Record of changes"), "/setup/audit", _("audit trail, who changed what"), "engineer"),
+        Door(_("Wall screens"), "/setup/screens", _("big screen in the hall, andon, dashboard, kiosk"), "admin"),
         Door(_("Notifications"), "/setup/notifications", _("mail, webhook, escalation, quiet hours, on call"), "admin"),
         Door(_("Background jobs"), "/setup/jobs", _("periodic jobs, failing"), "engineer"),
         Door(_("Proof"), "/proof", _("published examples, validation")),

@@ -21,6 +21,7 @@ def setup_page(
     if caller.may("admin"):
         tabs.append(("people", _("People"), "/setup/people"))
         tabs.append(("stations", _("Stations"), "/setup/stations"))
+        tabs.append(("screens", _("Wall screens"), "/setup/screens"))
         tabs.append(("notifications", _("Notifications"), "/setup/notifications"))
     if caller.may("engineer"):
         tabs.append(("audit", _("Record of changes"), "/setup/audit"))
@@ -49,6 +50,7 @@ def done(code: str) -> str | None:
         "role": _("The role is changed."),
         "disabled": _("The person can no longer sign in, and has been signed out everywhere."),
         "enabled": _("The person can sign in again."),
+        "screen-revoked": _("The key is revoked. The screen shows nothing from its next look on."),
         "unbound": _("The device is revoked. It shows nothing any more."),
         "badge": _("The badge is bound."),
         "no-badges": _("The badges are removed."),

@@ -13,6 +13,7 @@ from app.views.set_up import (
     notification_pages,
     people_pages,
     program_pages,
+    screen_pages,
     station_pages,
 )
 
@@ -31,6 +32,7 @@ for part in (
     program_pages,
     people_pages,
     station_pages,
+    screen_pages,
     notification_pages,
     audit_pages,
     job_pages,

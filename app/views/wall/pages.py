@@ -1,0 +1,83 @@
+"""The wall screen: a page that holds nothing, and what it shows, for its key alone.
+
+The key stands behind the # of the link, which browsers send to nobody: it is in no log and no address that is passed on. The page
+sends it as a key with each look.
+"""
+
+import time
+from collections import OrderedDict, deque
+from collections.abc import Hashable
+from threading import Lock
+
+from fastapi import APIRouter, Request, Response
+
+from app.access import screens
+from app.errors import NotSignedIn, TooManyRequests
+from app.language.i18n import _
+from app.views.wall import queries
+from app.views.wall.queries import Wall
+from app.web.deps import IN_TURN, SessionDep
+from app.web.templates import page
+
+router = APIRouter(include_in_schema=False)
+EVERY = 5
+"""Seconds between two looks of a screen."""
+MOST, WITHIN = 40, 60.0
+"""Looks of one screen, or wrong keys of one address, in so many seconds."""
+MOST_KNOWN = 1_000
+LASTS = 2.0
+"""Seconds for which what was found is shown to every screen: twenty of them ask the database as often as one."""
+
+
+class Rate:
+    """At most `MOST` calls of each in `WITHIN` seconds, of the `MOST_KNOWN` that called last."""
+
+    def __init__(self) -> None:
+        self._calls: OrderedDict[Hashable, deque[float]] = OrderedDict()
+        self._lock = Lock()
+
+    def call(self, who: Hashable, now: float) -> None:
+        """Note a call. Raises `TooManyRequests`."""
+        with self._lock:
+            calls = self._calls.setdefault(who, deque())
+            self._calls.move_to_end(who)
+            while calls and calls[0] <= now - WITHIN:
+                calls.popleft()
+            if len(calls) >= MOST:
+                raise TooManyRequests(
+                    _("The wall screen looks too often."), _("Wait a minute."), retry_after=round(WITHIN)
+                )
+            calls.append(now)
+            while len(self._calls) > MOST_KNOWN:
+                self._calls.popitem(last=False)
+
+
+class WallDoor:
+    """The rate of the screens of a plant, and what they were shown last. One per plant and process."""
+
+    def __init__(self) -> None:
+        self.rate = Rate()
+        self.shown: tuple[float, Wall] | None = None
+
+
+@router.get("/wall")
+def shell(request: Request) -> Response:
+    """The page; for everybody, because it holds nothing."""
+    return page(request, "wall/shell.html", every=EVERY)
+
+
+@router.get("/wall/now", dependencies=[IN_TURN])
+def look(request: Request, session: SessionDep) -> Response:
+    """What the screen shows now. Raises `NotSignedIn` for a key that is no screen's, `TooManyRequests`."""
+    door: WallDoor = request.app.state.wall
+    now = time.monotonic()
+    screen = screens.screen_at(request, session)
+    if screen is None:
+        door.rate.call(request.client.host if request.client else "", now)
+        raise NotSignedIn(
+            _("This link does not open a wall screen, or was revoked."), _("Ask an administrator for a new one.")
+        )
+    door.rate.call(screen, now)
+    if door.shown is None or now - door.shown[0] >= LASTS:
+        door.shown = (now, queries.wall(session))
+    return page(request, "wall/now.html", wall=door.shown[1])

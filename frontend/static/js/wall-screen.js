@@ -1,0 +1,75 @@
+// <wall-screen src="/wall/now" every="5" version="0.1.0" data-lost data-none data-refused data-nokey>
+// The wall screen. Asks again and again, for as long as it hangs there, with the key that stands behind the # of the address: no
+// server writes that into a log. Without an answer it says since when, and what was shown stays, paler; it goes on by itself.
+// After an update of the server it loads itself again. `.wall-trouble` says what is wrong, `.wall-now` holds what the server says.
+
+import { age } from "./times.js";
+
+const PATIENCE = 15_000; // ms for one answer
+const REFUSED = 60_000; // ms between two looks with a key that was refused
+
+class WallScreen extends HTMLElement {
+  connectedCallback() {
+    this.trouble = this.querySelector(".wall-trouble");
+    this.now = this.querySelector(".wall-now");
+    this.full = this.querySelector(".wall-full");
+    this.full.hidden = !document.fullscreenEnabled;
+    this.full.addEventListener("click", () => document.documentElement.requestFullscreen().catch(() => {}));
+    addEventListener("hashchange", () => location.reload());
+    setInterval(() => this.show(), 1_000);
+    if (location.hash.length > 1) this.look();
+    else this.say("refused", this.dataset.nokey);
+  }
+
+  async look() {
+    let pause = Number(this.getAttribute("every")) * 1_000;
+    try {
+      const answer = await fetch(this.getAttribute("src"), {
+        headers: { Authorization: `Bearer ${decodeURIComponent(location.hash.slice(1))}` },
+        cache: "no-store",
+        credentials: "omit",
+        signal: AbortSignal.timeout(PATIENCE),
+      });
+      if (answer.status === 401) {
+        this.now.replaceChildren();
+        this.say("refused", this.dataset.refused);
+        pause = REFUSED;
+      } else if (answer.ok) this.take(await answer.text());
+      else this.lose();
+    } catch {
+      this.lose();
+    }
+    setTimeout(() => this.look(), pause);
+  }
+
+  take(text) {
+    const made = new DOMParser().parseFromString(text, "text/html").querySelector(".wall-page");
+    if (!made) return this.lose();
+    if (made.dataset.version !== this.getAttribute("version")) return location.reload();
+    this.now.replaceChildren(made);
+    this.seen = Date.now();
+    this.clock = made.querySelector("time")?.textContent;
+    this.say("live", "");
+  }
+
+  lose() {
+    if (this.getAttribute("state") !== "refused") this.setAttribute("state", "lost");
+    this.show();
+  }
+
+  show() {
+    if (this.getAttribute("state") !== "lost") return;
+    const words = this.seen
+      ? this.dataset.lost.replace("{since}", this.clock).replace("{age}", age((Date.now() - this.seen) / 1000))
+      : this.dataset.none;
+    this.say("lost", words);
+  }
+
+  say(state, words) {
+    this.setAttribute("state", state);
+    this.trouble.hidden = !words;
+    if (this.trouble.textContent !== words) this.trouble.textContent = words;
+  }
+}
+
+customElements.define("wall-screen", WallScreen);

@@ -1,0 +1,120 @@
+"""The wall screen: opened by its own key, which opens nothing else; it says when it is old, and goes on by itself."""
+
+import re
+from collections.abc import Iterator
+
+import httpx
+import pytest
+from fastapi.routing import APIRoute, iter_route_contexts
+from playwright.sync_api import Browser, BrowserContext, expect
+
+from app.errors import TooManyRequests
+from app.views.wall.pages import MOST, WITHIN, Rate
+from tests.conftest import Server
+from tests.shop import Person, Shop, unique
+
+FOR_EVERYBODY = re.compile(
+    r"/wall|/sign-in|/invitation/.*|/station|/health/.*|/metrics|/api/v1/openapi\.json|/api/docs|/static/.*|/favicon\.ico"
+)
+
+
+@pytest.fixture(scope="module")
+def made(common_shop: Shop) -> tuple[int, str]:
+    """A wall screen: its number and its key."""
+    screen = common_shop.call("POST", "/wall-screens", 201, name=unique("Hall"))
+    return screen["id"], screen["url"].partition("/wall#")[2]
+
+
+@pytest.fixture
+def wall(server: Server, made: tuple[int, str]) -> httpx.Client:
+    """A screen without a session."""
+    return server.client(made[1])
+
+
+def test_it_shows_machines_alarms_and_parts(common_shop: Shop, wall: httpx.Client) -> None:
+    common_shop.read(350, part="w1")
+    shown = wall.get("/wall/now")
+    assert shown.status_code == 200
+    assert "Tool worn" in shown.text
+    assert "out of tolerance" in shown.text
+    assert "<form" not in shown.text
+    assert "<a " not in shown.text
+
+
+def test_its_key_opens_no_other_route(server: Server, made: tuple[int, str], wall: httpx.Client) -> None:
+    """Every route of the application, each by its own method, as a key and as every cookie there is."""
+    from app.main import create_plant
+    from app.settings import Settings
+
+    app = create_plant(Settings(database_url="postgresql://nobody@localhost/none")).app
+    cookies = {"inband_session": made[1], "inband_station": made[1]}
+    tried = 0
+    for context in iter_route_contexts(app.routes):
+        route = context.original_route
+        if not isinstance(route, APIRoute) or FOR_EVERYBODY.fullmatch(route.path) or route.path == "/wall/now":
+            continue
+        path = re.sub(r"\{[^}]*\}", "1", route.path)
+        answer = wall.request(min(route.methods or ()), path, cookies=cookies, follow_redirects=False)
+        to_sign_in = answer.status_code == 303 and answer.headers["location"].startswith(("/sign-in", "/station"))
+        assert answer.status_code in (401, 403) or to_sign_in, f"{route.methods} {path}: {answer.status_code}"
+        tried += 1
+    assert tried > 250
+
+
+def test_a_wrong_key_a_person_and_a_key_of_a_program_do_not_open_it(server: Server, viewer: Person) -> None:
+    assert server.client().get("/wall/now", follow_redirects=False).status_code in (303, 401)
+    assert server.client("inband_wall_guessed").get("/wall/now").status_code == 401
+    assert server.client(server.key("admin")).get("/wall/now").status_code == 401
+    assert viewer.browser.post("/api/v1/wall-screens", json={"name": "X"}).status_code == 403
+
+
+def test_it_is_made_and_revoked_on_its_page_and_on_record(server: Server, admin: Person, common_shop: Shop) -> None:
+    page = admin.send("/setup/screens", name=unique("Door"))
+    key = re.search(r"/wall#(inband_wall_[\w-]+)", page)
+    assert key is not None
+    assert key[1] not in admin.open("/setup/screens")
+    number = max(each["id"] for each in common_shop.call("GET", "/wall-screens?limit=1000")["items"])
+    screen = server.client(key[1])
+    assert screen.get("/wall/now").status_code == 200
+    assert "revoked" in admin.send(f"/setup/screens/{number}/revoke")
+    assert screen.get("/wall/now").status_code == 401
+    entries = common_shop.call("GET", f"/audit?subject=wall-screen/{number}")["items"]
+    assert {each["action"] for each in entries} == {"wall screen made", "wall screen revoked"}
+    assert key[1] not in str(entries)
+    common_shop.call("DELETE", "/wall-screens/999999", 404)
+
+
+def test_its_looks_are_counted() -> None:
+    rate = Rate()
+    for number in range(MOST):
+        rate.call("hall", float(number) / MOST)
+    rate.call("another", 1.0)
+    with pytest.raises(TooManyRequests):
+        rate.call("hall", 1.0)
+    rate.call("hall", 1.0 + WITHIN)
+
+
+@pytest.fixture
+def stranger(browser: Browser) -> Iterator[BrowserContext]:
+    """A browser that nobody has signed in with."""
+    context = browser.new_context(viewport={"width": 1920, "height": 1080})
+    yield context
+    context.close()
+
+
+def test_it_says_since_when_it_is_old_and_goes_on(
+    stranger: BrowserContext, server: Server, made: tuple[int, str]
+) -> None:
+    page = stranger.new_page()
+    page.clock.install()
+    page.goto(f"{server.url}/wall#{made[1]}")
+    tile = page.locator(".wall-machines li").first
+    expect(tile).to_be_visible()
+    page.route("**/wall/now", lambda route: route.abort())
+    page.clock.fast_forward(6_000)
+    expect(page.locator(".wall-trouble")).to_contain_text("No connection since")
+    expect(tile).to_be_visible()
+    page.unroute("**/wall/now")
+    page.clock.fast_forward(6_000)
+    expect(page.locator(".wall-trouble")).to_be_hidden()
+    expect(tile).to_be_visible()
