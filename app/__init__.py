@@ -20,6 +20,7 @@ only through each other's queries and actions. frontend/ and migrations/ lie bes
         compare          several characteristics, versions, tools or periods side by side
         wall             the wall screen: machines, alarms, parts of the shift, from five metres, by a key of its own
         shift            one shift: parts, alarms and how fast they were acknowledged, corrections, what comes next
+        alarm_load       rates, floods, chattering and stale alarms by ISA-18.2, and the ten noisiest
         overview         every characteristic ranked by what needs attention, with the reasons
         to_do            everything that waits for a person, with one count
         approvals        corrections that wait for a person

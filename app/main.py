@@ -106,6 +106,8 @@ from app.quality.wear import api as wear
 from app.quality.what_if import api as what_if
 from app.quality.what_if import pages as what_if_pages
 from app.settings import Settings
+from app.views.alarm_load import api as alarm_load
+from app.views.alarm_load import pages as alarm_load_pages
 from app.views.approvals import pages as queue_pages
 from app.views.characteristic import capability_pages, figures_api, six_pack
 from app.views.characteristic import pages as characteristic_pages
@@ -191,6 +193,7 @@ ROUTERS: tuple[APIRouter, ...] = (
     programs.router,
     text_api.router,
     alarms.router,
+    alarm_load.router,
     quarantine.router,
     control_plan.router,
     notes.router,
@@ -225,6 +228,7 @@ ROUTERS: tuple[APIRouter, ...] = (
     signals_pages.router,
     capability_pages.router,
     six_pack.router,
+    alarm_load_pages.router,  # before the pages of alarms by their number
     alarm_pages.router,
     quarantine_pages.router,
     control_plan_pages.router,

@@ -7,6 +7,7 @@ _BEHIND: tuple[tuple[str, str], ...] = (
     (r"/station/[^/]+/sizes", "how-to/sizes-by-hand"),
     (r"/station(/.*)?|/setup/stations", "how-to/stations"),
     (r"/alarms/[^/]+/affected|/quarantines(/.*)?", "how-to/quarantine"),
+    (r"/alarms/load", "how-to/alarm-load"),
     (r"/alarms(/.*)?|/todo", "how-to/acknowledge-alarms"),
     (r"/corrections(/.*)?", "how-to/approve-corrections"),
     (r"/machines/[^/]+/corrections/program", "how-to/program-text"),

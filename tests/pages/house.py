@@ -106,6 +106,7 @@ PAGES = {
     "/proposals": ["/proposals", "/proposals?status=all"],
     "/proposals/{number}": ["/proposals/{proposal}"],
     "/alarms": ["/alarms", "/alarms?machine={machine}"],
+    "/alarms/load": ["/alarms/load", "/alarms/load?machine={machine}"],
     "/alarms/history": ["/alarms/history"],
     "/alarms/{number}": ["/alarms/{alarm}", "/alarms/{alarm}?action=keep_cutting"],
     "/alarms/{number}/affected": ["/alarms/{alarm}/affected"],

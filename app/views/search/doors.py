@@ -22,6 +22,11 @@ def doors() -> list[Door]:
         Door(_("To do"), "/todo", _("what waits for a person, open tasks")),
         Door(_("Alarms"), "/alarms", _("acknowledge, tool worn, probe fault")),
         Door(_("History of alarms"), "/alarms/history", _("acknowledged alarms")),
+        Door(
+            _("Alarm load"),
+            "/alarms/load",
+            _("ISA-18.2, IEC 62682, alarm flood, chattering, stale, nuisance alarms, top ten"),
+        ),
         Door(_("Quarantines"), "/quarantines", _("parts set aside, affected parts, release, scrap, containment")),
         Door(_("Approvals"), "/corrections", _("corrections that wait, approve, held")),
         Door(_("Proposals"), "/proposals", _("proposed parameters, what-if")),

@@ -68,7 +68,7 @@ def shell(request: Request) -> Response:
 
 @router.get("/wall/now", dependencies=[IN_TURN])
 def look(request: Request, session: SessionDep) -> Response:
-    """What the screen shows now. Raises `NotSignedIn` for a key that is no screen's, `TooManyRequests`."""
+    """The screen as it is now. Raises `NotSignedIn` for a key that is no screen's, `TooManyRequests`."""
     door: WallDoor = request.app.state.wall
     now = time.monotonic()
     screen = screens.screen_at(request, session)

@@ -1,0 +1,58 @@
+"""The words of the load by alarms: what makes an alarm, where that is set, and what a quieter setting would have done."""
+
+from app.core.alarm_load import LoadVerdict
+from app.language.i18n import _
+from app.views.alarm_load.queries import Loud
+
+
+def verdict_word(verdict: LoadVerdict) -> str:
+    """The mean rate against the standard, in a word or two."""
+    return {
+        LoadVerdict.ACCEPTABLE: _("acceptable"),
+        LoadVerdict.MANAGEABLE: _("manageable at most"),
+        LoadVerdict.TOO_MANY: _("too many"),
+    }[verdict]
+
+
+def made_by(kind: str) -> str:
+    """The rule or parameter by which alarms of a kind are raised."""
+    return {
+        "oversize": _("tolerance R35, reached in spite of R33, R34 and k"),
+        "undersize": _("tolerance R35, reached in spite of R33, R34 and k"),
+        "tool_worn": _("wear limit R37"),
+        "probe_fault": _("confidence limit R36, or the probe itself"),
+        "implausible": _("largest plausible jump"),
+        "acceptance": _("acceptance n of m"),
+        "offset_limit": _("largest sum of corrections"),
+        "offset_differs": _("offset that the control reports"),
+        "opposite_effect": _("factor, or the offset register"),
+        "unusual_gain": _("factor"),
+        "corrections_not_taken": _("INBAND_CORRECTIONS_TAKEN_WITHIN"),
+        "tool_life": _("planned life of the edge"),
+        "hunting": _("zero range R33 and k"),
+        "signal": _("run rule"),
+        "bridge_silent": _("INBAND_BRIDGE_SILENT_AFTER"),
+        "bridge_backing_up": _("INBAND_BRIDGE_BACKLOG_AFTER"),
+        "machine_fault": _("report of the machine"),
+        "calibration_overdue": _("calibration plan"),
+        "calibration_refused": _("limits of calibration"),
+        "fixture_shifted": _("limit of the fixture"),
+        "kinematics_drift": _("limit of the axis"),
+    }.get(kind, kind)
+
+
+def quieter_words(loud: Loud) -> str:
+    """The effect that a quieter setting would have had on these alarms; where it is not computed, that."""
+    found, kind = loud.quieter, loud.cause.kind
+    if found is None:
+        if kind in {"oversize", "undersize", "hunting"} and loud.characteristic is not None:
+            return _("not computed here: What if replays other R33, R34 and k")
+        return _("not computed")
+    left = _("{left} of {n} alarms left").format(left=found.left, n=found.alarms)
+    match kind:
+        case "signal":
+            return _("rule without alarm: {left}; its signals stay on the list").format(left=left)
+        case "bridge_silent":
+            return _("silent after {factor:g} times as long: {left}").format(factor=found.factor or 1, left=left)
+        case _:
+            return _("R37 wider by {percent:.0f} %: {left}").format(percent=((found.factor or 1) - 1) * 100, left=left)

@@ -1,0 +1,89 @@
+"""The load by alarms, over REST and on its page, from alarms that were stored."""
+
+from datetime import UTC, datetime, timedelta
+
+import pytest
+from sqlalchemy import text
+
+from tests.conftest import Server
+from tests.shop import Person, Shop
+
+BEGIN = datetime(2026, 2, 3, 6, tzinfo=UTC)
+"""In a past in which nothing else was raised."""
+PERIOD = "from=2026-02-03T06:00:00Z&to=2026-02-03T10:00:00Z"
+
+
+@pytest.fixture(scope="module")
+def ran(common_shop: Shop, server: Server) -> Shop:
+    """A flood of twelve alarms, three of them of one cause in a minute; a silent bridge, twice; one that is active ever since."""
+    flood = [("hunting", tool, 60.0 * tool, 30.0, None) for tool in range(1, 10)]
+    chatter = [("hunting", 20, 540.0 + 20 * number, 5.0, None) for number in range(3)]
+    silent = [("bridge_silent", None, 7200.0, 90.0, 60), ("bridge_silent", None, 9000.0, 600.0, 60)]
+    with server.database.begin() as session:
+        for kind, tool, at, lasted, silent_for in [*flood, *chatter, *silent, ("tool_life", 30, 10_000.0, None, None)]:
+            raised = BEGIN + timedelta(seconds=at)
+            heard = raised - timedelta(seconds=silent_for or 0)
+            session.execute(
+                text("""
+                INSERT INTO alarm (machine_id, tool_memory, kind, raised_at, acknowledged_at, acknowledged_by, data)
+                SELECT id, :tool, :kind, :at, :ended, 'ana', jsonb_strip_nulls(jsonb_build_object('received_at', CAST(:heard AS text)))
+                FROM machine WHERE key = :key
+                """),
+                {
+                    "tool": tool,
+                    "kind": kind,
+                    "at": raised,
+                    "ended": None if lasted is None else raised + timedelta(seconds=lasted),
+                    "heard": heard.isoformat() if silent_for else None,
+                    "key": common_shop.machine,
+                },
+            )
+    return common_shop
+
+
+def test_it_counts_by_position_and_names_what_makes_the_noise(ran: Shop) -> None:
+    found = ran.call("GET", f"/alarm-load?machine={ran.machine}&{PERIOD}")
+    (position,) = found["positions"]
+    assert (position["alarms"], position["most"], position["over"], position["stale"]) == (15, 12, 1, 1)
+    assert position["per_ten_minutes"] == pytest.approx(15 / 24)
+    assert position["verdict"] == "acceptable"
+    assert [flood["alarms"] for flood in position["floods"]] == [12]
+    assert not found["enough"]
+    loudest = found["top"][0]
+    assert (loudest["kind"], loudest["tool_memory"], loudest["alarms"], loudest["chatters"]) == ("hunting", 20, 3, True)
+    assert loudest["quieter_left"] is None
+    silent = found["top"][1]
+    assert (silent["kind"], silent["alarms"], silent["quieter_left"], silent["chatters"]) == (
+        "bridge_silent",
+        2,
+        1,
+        False,
+    )
+    assert silent["made_by"] == "INBAND_BRIDGE_SILENT_AFTER"
+    assert len(found["stale"]) == 1
+
+
+def test_a_wider_wear_limit_is_replayed_from_the_readings(ran: Shop) -> None:
+    for micrometres in (320, 500):
+        ran.read(micrometres)
+        ran.acknowledge(next(each["id"] for each in ran.alarms() if each["kind"] == "tool_worn"), "tool_replaced")
+    found = ran.call("GET", f"/alarm-load?machine={ran.machine}")
+    (worn,) = [each for each in found["top"] if each["kind"] == "tool_worn"]
+    assert (worn["alarms"], worn["quieter_left"]) == (2, 1)
+    assert worn["quieter"] == "R37 wider by 25 %: 1 of 2 alarms left"
+
+
+def test_its_page_shows_the_same_and_what_it_rests_on(ran: Shop, server: Server) -> None:
+    viewer = Person(server, "viewer")
+    page = viewer.open(f"/alarms/load?machine={ran.machine}&{PERIOD}")
+    for words in (
+        "ISA-18.2",
+        "15",
+        "INBAND_BRIDGE_SILENT_AFTER",
+        "1 of 2 alarms left",
+        "not computed",
+        "Active for more than 24 h",
+    ):
+        assert words in page
+    assert "No alarm in this period" in viewer.open(f"/alarms/load?machine={ran.machine}&from=2020-01-01&to=2020-01-02")
+    ran.call("GET", "/alarm-load?from=2020-01-01&to=2026-01-01", 422)
