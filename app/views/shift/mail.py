@@ -8,7 +8,7 @@ from sqlalchemy.exc import SQLAlchemyError
 from sqlalchemy.orm import Session
 
 from app.language.i18n import _, ngettext
-from app.language.numbers import NOTHING, age, um_limit
+from app.language.numbers import NOTHING, age, plain_um
 from app.language.times import MINUTES, written
 from app.loop.alarm_response.wording import kind_word
 from app.views.shift import queries
@@ -63,7 +63,7 @@ def _text(found: Shift) -> str:
             n=made.corrections,
             held=made.held,
             not_taken=made.not_taken,
-            largest=NOTHING if made.largest is None else um_limit(made.largest, ""),
+            largest=plain_um(made.largest),
         ),
         _("Tool changes: {n}").format(n=found.tool_changes),
     ]

@@ -19,7 +19,7 @@ from app.web.paging import address
 from app.web.templates import page
 
 router = APIRouter(include_in_schema=False, dependencies=[FROM_REPLICA])
-ON_PAGE = 5
+ON_PAGE = 4
 """Lines of a list; what is more is named by its number, for the page fits a screen and a sheet."""
 
 

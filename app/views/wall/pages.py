@@ -14,6 +14,7 @@ from fastapi import APIRouter, Request, Response
 from app.access import screens
 from app.errors import NotSignedIn, TooManyRequests
 from app.language.i18n import _
+from app.language.times import written
 from app.views.wall import queries
 from app.views.wall.queries import Wall
 from app.web.deps import IN_TURN, SessionDep
@@ -80,4 +81,7 @@ def look(request: Request, session: SessionDep) -> Response:
     door.rate.call(screen, now)
     if door.shown is None or now - door.shown[0] >= LASTS:
         door.shown = (now, queries.wall(session))
-    return page(request, "wall/now.html", wall=door.shown[1])
+    wall = door.shown[1]
+    return page(
+        request, "wall/now.html", wall=wall, since=written(wall.since, "%H:%M"), at=written(wall.at, "%H:%M:%S")
+    )
