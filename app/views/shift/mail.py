@@ -4,7 +4,6 @@ import logging
 from datetime import datetime, timedelta
 from urllib.parse import urlencode
 
-from sqlalchemy.exc import SQLAlchemyError
 from sqlalchemy.orm import Session
 
 from app.language.i18n import _, ngettext
@@ -29,7 +28,7 @@ def shift_words(session: Session, end: datetime, address: str) -> tuple[str, str
     try:
         with session.begin_nested():
             found = queries.shift(session, inside, end)
-    except SQLAlchemyError:
+    except Exception:
         log.exception("the shift until %s cannot be worked out", end)
         return _("Shift until {end}").format(end=written(end, MINUTES)), f"{link}\n"
     return None if found.empty else (_subject(found), f"{_text(found)}\n\n{link}\n")

@@ -89,7 +89,7 @@ GROUP BY GROUPING SETS ((machine_id), ())
 """  # noqa: S608 - made of our own name
 
 _CHANGES = """
-SELECT machine_id, count(*) FROM tool_event
+SELECT machine_id, count(*) AS changes FROM tool_event
 WHERE kind <> 'correction' AND kind = 'change' AND at >= :start AND at < :end
     AND (CAST(:machine AS int) IS NULL OR machine_id = :machine)
 GROUP BY machine_id
@@ -225,7 +225,7 @@ def shift(session: Session, at: datetime, now: datetime, machine: str | None = N
     period = period_at(at, now)
     where = {"start": period.start, "end": period.end, "machine": chosen.id if chosen else None}
     made, answered = made_in(session, period, chosen.id if chosen else None), _answered(session, where)
-    changes: dict[int, int] = dict(session.execute(text(_CHANGES), where).tuples().all())
+    changes: dict[int, int] = {row.machine_id: row.changes for row in session.execute(text(_CHANGES), where)}
     of_machines = [
         OfMachine(each, made.get(each.id, Made()), answered.get(each.id, Answered()), changes.get(each.id, 0))
         for each in ([chosen] if chosen else machines(session))
