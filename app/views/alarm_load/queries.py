@@ -123,7 +123,7 @@ def alarm_load(
     """
     chosen = machine_named(session, machine) if machine is not None else None
     end = min(period.end or now, now)
-    start = period.start or end - timedelta(days=DAYS)
+    start = period.start or _round(end - timedelta(days=DAYS))
     if start >= end or end - start > timedelta(days=MOST_DAYS):
         raise Invalid.at("from", _("must lie before the end, and at most {n} days before it").format(n=MOST_DAYS))
     rows = _rows(session, Period(start, end), chosen)
@@ -144,6 +144,11 @@ def alarm_load(
         positions.insert(0, Position(None, load((row.raised_at for row in rows), start, end), len(stale)))
     top = _top(session, rows, known, now, silent_after)
     return AlarmLoad(Period(start, end), chosen, positions, top, stale, cut)
+
+
+def _round(at: datetime) -> datetime:
+    """Down to the ten minutes of the clock: without it, what is counted together would change from look to look."""
+    return at.replace(minute=at.minute // 10 * 10, second=0, microsecond=0)
 
 
 def _rows(session: Session, period: Period, machine: Machine | None) -> Sequence[Any]:
