@@ -2,15 +2,15 @@
 
 `downgrade` loses both, and the record of these deliveries.
 
-Revision ID: 0124
-Revises: 0123
+Revision ID: 0126
+Revises: 0125
 Create Date: 2026-11-27
 """
 
 from alembic import op
 
-revision = "0124"
-down_revision: str | None = "0123"
+revision = "0126"
+down_revision: str | None = "0125"
 branch_labels = None
 depends_on = None
 

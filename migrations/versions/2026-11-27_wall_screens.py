@@ -2,15 +2,15 @@
 
 `downgrade` loses them; the record of changes keeps who made which.
 
-Revision ID: 0125
-Revises: 0124
+Revision ID: 0127
+Revises: 0126
 Create Date: 2026-11-27
 """
 
 from alembic import op
 
-revision = "0125"
-down_revision: str | None = "0124"
+revision = "0127"
+down_revision: str | None = "0126"
 branch_labels = None
 depends_on = None
 

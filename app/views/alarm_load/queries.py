@@ -162,7 +162,7 @@ def _rows(session: Session, period: Period, machine: Machine | None) -> Sequence
             Alarm.tool_memory,
             Alarm.raised_at,
             Alarm.acknowledged_at,
-            Alarm.count,
+            Alarm.count.label("happened"),
             Alarm.last_at,
             Alarm.data["location"].astext.label("place"),
             Alarm.data["rule"].astext.label("rule"),
@@ -188,19 +188,22 @@ def _stale(session: Session, now: datetime, machine: Machine | None) -> list[Sta
     return [Stale(*row) for row in session.execute(query)]
 
 
-def _cause(row: Any) -> Cause:
-    return Cause(row.kind, row.machine_id, row.characteristic_id, row.tool_memory, row.place)
-
-
 def _top(
     session: Session, rows: Sequence[Any], known: dict[int, Machine], now: datetime, silent_after: float
 ) -> list[Loud]:
-    alarms = [Annunciation(_cause(row), row.raised_at, row.acknowledged_at, row.count, row.last_at) for row in rows]
+    of: dict[Cause, list[Any]] = defaultdict(list)
+    for row in rows:
+        of[Cause(row.kind, row.machine_id, row.characteristic_id, row.tool_memory, row.place)].append(row)
+    alarms = [
+        Annunciation(cause, row.raised_at, row.acknowledged_at, row.happened, row.last_at)
+        for cause, of_cause in of.items()
+        for row in of_cause
+    ]
     found: list[Loud] = []
     for noise in noisiest(alarms, TOP):
         cause = noise.cause
         assert isinstance(cause, Cause)
-        of_cause = [row for row in rows if _cause(row) == cause]
+        of_cause = of[cause]
         characteristic = None
         if cause.characteristic_id is not None:
             characteristic = session.get(Characteristic, (cause.machine_id, cause.characteristic_id))
