@@ -62,6 +62,7 @@ def demo(
         say(_("Sign in as one of these (kept for the next start in {file}):").format(file=people.file_of(settings)))
         for name in people.PEOPLE:
             say(f"  {name:<9} " + passwords.get(name, _("(the password you have chosen)")), style="bold")
+        say(_("Wall screen, without signing in: {link}").format(link=people.wall_link(database, settings)))
 
     def beside(settings: "Settings") -> None:
         start(settings, plant_key[0], seed, speed, past)

@@ -11,7 +11,7 @@ from pathlib import Path
 
 from sqlalchemy.orm import Session
 
-from app.access import actions, queries
+from app.access import actions, queries, screens
 from app.db.engine import Database
 from app.errors import InbandError
 from app.language.i18n import _
@@ -57,6 +57,15 @@ def plant_key(database: Database) -> str:
             if key.name == ACTOR and key.revoked_at is None:
                 actions.revoke_key(session, key.id, ACTOR)
         return actions.add_key(session, name=ACTOR, role="admin", actor=ACTOR).secret
+
+
+def wall_link(database: Database, settings: Settings) -> str:
+    """The link of a wall screen for this run; that of the run before is revoked."""
+    with database.begin() as session:
+        for screen in screens.screens(session):
+            if screen.name == ACTOR:
+                screens.revoke_screen(session, screen.id, ACTOR)
+        return f"{settings.address}/wall#{screens.add_screen(session, ACTOR, ACTOR).key}"
 
 
 def _refuse_a_real_plant(session: Session, settings: Settings, path: Path) -> None:
