@@ -10,9 +10,10 @@ from collections.abc import Hashable
 from threading import Lock
 
 from fastapi import APIRouter, Request, Response
+from starlette.responses import PlainTextResponse
 
 from app.access import screens
-from app.errors import NotSignedIn, TooManyRequests
+from app.errors import TooManyRequests
 from app.language.i18n import _
 from app.language.times import written
 from app.views.wall import queries
@@ -23,7 +24,7 @@ from app.web.templates import page
 router = APIRouter(include_in_schema=False)
 EVERY = 5
 """Seconds between two looks of a screen."""
-MOST, WITHIN = 40, 60.0
+MOST, WITHIN = 120, 60.0
 """Looks of one screen, or wrong keys of one address, in so many seconds."""
 MOST_KNOWN = 1_000
 LASTS = 2.0
@@ -69,15 +70,16 @@ def shell(request: Request) -> Response:
 
 @router.get("/wall/now", dependencies=[IN_TURN])
 def look(request: Request, session: SessionDep) -> Response:
-    """The screen as it is now. Raises `NotSignedIn` for a key that is no screen's, `TooManyRequests`."""
+    """The screen as it is now. A key that is no screen's is answered 401, no way to sign in: nobody does there.
+
+    Raises `TooManyRequests`.
+    """
     door: WallDoor = request.app.state.wall
     now = time.monotonic()
     screen = screens.screen_at(request, session)
     if screen is None:
         door.rate.call(request.client.host if request.client else "", now)
-        raise NotSignedIn(
-            _("This link does not open a wall screen, or was revoked."), _("Ask an administrator for a new one.")
-        )
+        return PlainTextResponse(_("This link does not open a wall screen, or was revoked."), 401)
     door.rate.call(screen, now)
     if door.shown is None or now - door.shown[0] >= LASTS:
         door.shown = (now, queries.wall(session))

@@ -62,7 +62,7 @@ def test_its_key_opens_no_other_route(server: Server, made: tuple[int, str], wal
 
 
 def test_a_wrong_key_a_person_and_a_key_of_a_program_do_not_open_it(server: Server, viewer: Person) -> None:
-    assert server.client().get("/wall/now", follow_redirects=False).status_code in (303, 401)
+    assert server.client().get("/wall/now", follow_redirects=False).status_code == 401
     assert server.client("inband_wall_guessed").get("/wall/now").status_code == 401
     assert server.client(server.key("admin")).get("/wall/now").status_code == 401
     assert viewer.browser.post("/api/v1/wall-screens", json={"name": "X"}).status_code == 403
@@ -102,19 +102,24 @@ def stranger(browser: Browser) -> Iterator[BrowserContext]:
     context.close()
 
 
-def test_it_says_since_when_it_is_old_and_goes_on(
-    stranger: BrowserContext, server: Server, made: tuple[int, str]
+def test_it_says_since_when_it_is_old_goes_on_and_ends_when_revoked(
+    stranger: BrowserContext, common_shop: Shop, server: Server
 ) -> None:
+    screen = common_shop.call("POST", "/wall-screens", 201, name=unique("Hall"))
     page = stranger.new_page()
     page.clock.install()
-    page.goto(f"{server.url}/wall#{made[1]}")
-    tile = page.locator(".wall-machines li").first
+    page.goto(f"{server.url}/wall#{screen['url'].partition('#')[2]}")
+    tile, trouble = page.locator(".wall-machines li").first, page.locator(".wall-trouble")
     expect(tile).to_be_visible()
     page.route("**/wall/now", lambda route: route.abort())
     page.clock.fast_forward(6_000)
-    expect(page.locator(".wall-trouble")).to_contain_text("No connection since")
+    expect(trouble).to_contain_text("No connection since")
     expect(tile).to_be_visible()
     page.unroute("**/wall/now")
     page.clock.fast_forward(6_000)
-    expect(page.locator(".wall-trouble")).to_be_hidden()
+    expect(trouble).to_be_hidden()
     expect(tile).to_be_visible()
+    common_shop.call("DELETE", f"/wall-screens/{screen['id']}", 204)
+    page.clock.fast_forward(6_000)
+    expect(trouble).to_contain_text("revoked")
+    expect(tile).to_be_hidden()
