@@ -58,7 +58,7 @@ class Position(NamedTuple):
 
 
 class Quieter(NamedTuple):
-    """The effect of a quieter setting: so many of the alarms would have been raised all the same."""
+    """The effect of a quieter setting: how many of the alarms would have been raised all the same."""
 
     alarms: int
     left: int

@@ -25,7 +25,7 @@ router = APIRouter(include_in_schema=False)
 EVERY = 5
 """Seconds between two looks of a screen."""
 MOST, WITHIN = 120, 60.0
-"""Looks of one screen, or wrong keys of one address, in so many seconds."""
+"""Looks of one screen, or wrong keys of one address, and the seconds in which they are counted."""
 MOST_KNOWN = 1_000
 LASTS = 2.0
 """Seconds for which what was found is shown to every screen: twenty of them ask the database as often as one."""
