@@ -68,7 +68,11 @@ def _sentence(same: _Same) -> str:
 
 
 def once(remarks: Iterable[Remark]) -> list[str]:
-    """Sentences of these remarks, each said once."""
+    """Sentences of these remarks, each said once; a line that is named twice counts as one.
+
+    >>> once([Remark(4, "K2142", "Nm", "is no length"), Remark(4, "K2142", "N", "is no length")])
+    ["line 4, K2142: 'Nm' is no length"]
+    """
     found = Repeats()
     for remark in remarks:
         found.add(remark)

@@ -2,6 +2,7 @@
 
 import json
 import re
+from collections.abc import Mapping
 from dataclasses import replace
 from datetime import UTC, datetime
 from pathlib import Path
@@ -9,6 +10,7 @@ from pathlib import Path
 import pytest
 from openpyxl import Workbook
 
+from app.bridge.file_rows import Table, cell_of, csv_rows
 from app.errors import Invalid
 from app.files.formats.delimited import BLANKS
 from app.files.formats.spreadsheet import text_of
@@ -398,6 +400,13 @@ def test_the_blocks_of_a_report_are_one_table(tmp_path: Path) -> None:
     [d] = [each for each in contents(look(tmp_path / "report.txt", Wishes())) if each.title.endswith("LOC1 D")]
     assert [parameters_of(d)[name] for name in ("nominal", "upper_deviation", "lower_deviation")] == [10, 0.03, -0.01]
     assert of_report(tmp_path, REPORT.format(serial=1, size="10.004", unit="IN"))["LOC2 TP"] == [(17, 1.7272, "1")]
+
+
+def test_a_bridge_reads_the_same_rows_of_a_report(tmp_path: Path) -> None:
+    path = write(tmp_path, REPORT.format(serial=12, size="10.004", unit="MM"), name="report.txt")
+    rows = csv_rows(path, Table("utf-8", None, {"Feature+AX", "MEAS", "Serial number"}, set()))
+    found = {cell_of(row, "Feature+AX"): (at, row["MEAS"]) for at, row in rows if isinstance(row, Mapping)}
+    assert (found["LOC1 D"], found["LOC2 TP"], len(found)) == ((10, "10.004"), (17, "0.068"), 5)
 
 
 def test_a_row_of_a_report_that_is_cut_or_moved_is_refused_by_line(tmp_path: Path) -> None:
