@@ -47,8 +47,8 @@ class Due(StrEnum):
 class Plan:
     """The rules by which a characteristic is measured.
 
-    every: 1 in so many parts; minutes: at least once in so many minutes of running; per_shift: at least once in each shift in
-    which the part is made. after_change, after_alarm: every part for so many readings. on_the_way: parts that lie between the
+    every: 1 in N parts; minutes: at least once in N minutes of running; per_shift: at least once in each shift in
+    which the part is made. after_change, after_alarm: every part for N readings. on_the_way: parts that lie between the
     machine and the gauge. numbered: parts are numbered one by one, so that a number that is missing is a part.
     """
 
@@ -103,7 +103,7 @@ class Judged(NamedTuple):
 
 
 def rhythm(plan: Plan, since_change: int | None, since_alarm: int | None) -> Rhythm:
-    """The interval in force after so many readings since the tool change and since the last alarm; None: there was none.
+    """The interval in force after N readings since the tool change and since the last alarm; None: there was none.
 
     >>> plan = Plan(every=5, after_change=3, after_alarm=10)
     >>> rhythm(plan, 2, None), rhythm(plan, 3, 9).every, rhythm(plan, 3, 10).every

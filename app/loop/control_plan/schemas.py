@@ -13,11 +13,11 @@ from app.web.fields import Body, Reason
 
 Every = Annotated[int, Field(strict=True, ge=1, le=1000)]
 Few = Annotated[int, Field(strict=True, ge=0, le=1000)]
-_EVERY = "1 in so many parts is measured, 1: every part; null: parts do not count."
-_MINUTES = "At least one measurement in so many minutes while the machine runs; null: minutes do not count."
+_EVERY = "1 in N parts is measured, 1: every part; null: parts do not count."
+_MINUTES = "At least one measurement in N minutes while the machine runs; null: minutes do not count."
 _PER_SHIFT = "At least one measurement in each shift in which the part is made."
-_AFTER_CHANGE = "Every part is measured for so many readings after a tool change."
-_AFTER_ALARM = "Every part is measured for so many readings after an alarm about the characteristic or its tool."
+_AFTER_CHANGE = "Every part is measured for N readings after a tool change."
+_AFTER_ALARM = "Every part is measured for N readings after an alarm about the characteristic or its tool."
 _ON_THE_WAY = "Parts that lie between the machine and the gauge: they are not missed yet."
 _NUMBERED = "Parts are numbered one by one on this machine, so a number that is missing between two is a part."
 
