@@ -29,6 +29,7 @@ only through each other's queries and actions. frontend/ and migrations/ lie bes
         characteristic   one characteristic: zone chart, decisions, capability
         set_up           machines, characteristics, people, programs, the record, background jobs
     quality          judgement of processes and of measuring systems
+        sampling         how many parts need not be measured, with the risk of it
         trial            a characteristic that only measures, and the loop that would have corrected it
         ledger           what corrections were worth: rejects prevented and caused, in pieces and in money
         what_if          stored readings replayed with other settings, maps of them, proposals of changes

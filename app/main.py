@@ -99,6 +99,8 @@ from app.quality.ledger import pages as ledger_pages
 from app.quality.proof import api as proof
 from app.quality.proof import pages as proof_pages
 from app.quality.proof import queries as proofs
+from app.quality.sampling import api as sampling
+from app.quality.sampling import pages as sampling_pages
 from app.quality.trial import api as trial
 from app.quality.trial import pages as trial_pages
 from app.quality.wear import actions as wear_actions
@@ -175,6 +177,7 @@ ROUTERS: tuple[APIRouter, ...] = (
     what_if.router,
     ledger.router,
     trial.router,
+    sampling.router,
     signals_api.router,
     readings.push,
     reading_list.router,
@@ -225,6 +228,7 @@ ROUTERS: tuple[APIRouter, ...] = (
     what_if_pages.router,
     ledger_pages.router,
     trial_pages.router,
+    sampling_pages.router,
     signals_pages.router,
     capability_pages.router,
     six_pack.router,

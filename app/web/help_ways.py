@@ -23,7 +23,7 @@ _BEHIND: tuple[tuple[str, str], ...] = (
     (r"/characteristics/[^/]+/control(/.*)?|/count-charts", "how-to/control-charts"),
     (r"/characteristics/[^/]+/(rules|signals)|/signals/.*", "how-to/run-rules"),
     (r"/characteristics/[^/]+/(capability|six-pack)|/overview", "how-to/capability"),
-    (r"/characteristics/[^/]+/control-plan", "how-to/control-plan"),
+    (r"/characteristics/[^/]+/(control-plan|sampling)", "how-to/control-plan"),
     (r"/characteristics/[^/]+/trial(/.*)?", "how-to/shadow-trial"),
     (r"/ledger", "how-to/ledger"),
     (r"/shift", "how-to/shift"),

@@ -94,6 +94,10 @@ PAGES = {
         "/characteristics/{characteristic}/trial",
         "/characteristics/{characteristic}-empty/trial",
     ],
+    "/characteristics/{characteristic}/sampling": [
+        "/characteristics/{characteristic}/sampling?seconds=12",
+        "/characteristics/{characteristic}-empty/sampling",
+    ],
     "/characteristics/{characteristic}/control-plan": [
         "/characteristics/{characteristic}/control-plan",
         "/characteristics/{characteristic}-empty/control-plan",

@@ -340,7 +340,7 @@ def body_of(operation: Json) -> Json:
 
 
 # What these ask for, the twenty readings of this server do not carry: a good request, and a refusal in words.
-OF_MANY_READINGS = ("/baselines", "/trial", "/baselines/preview", "/gauge-studies/from-readings")
+OF_MANY_READINGS = ("/baselines", "/trial", "/sampling", "/baselines/preview", "/gauge-studies/from-readings")
 
 
 # What a page's form does, by the operations of the API that do the same; None: there is none, or it is for everybody.
