@@ -44,6 +44,7 @@ only through each other's queries and actions. frontend/ and migrations/ lie bes
         geometric_form   form and position: roundness, flatness, position, with uncertainty
         rotary_axes      preset compensation of rotary axes, drift, back-ups of the kinematics
     loop             the compensation loop
+        reactions        what to do at which alarm, causes and corrective actions to choose from, causes by frequency
         notifications    who is notified of which alarm, by mail, webhook or apprise; deliveries on record
         summaries        counts, standard deviations, charts of ten million points
         control_plan     how often each characteristic is measured, and measurements that were missed

@@ -62,6 +62,8 @@ from app.loop.notifications.notifier import Notifier
 from app.loop.programs import api as programs
 from app.loop.quarantine import api as quarantine
 from app.loop.quarantine import pages as quarantine_pages
+from app.loop.reactions import api as reactions
+from app.loop.reactions import pages as reaction_pages
 from app.loop.readings import api as readings
 from app.loop.readings import aqdef_api, results_actions, table_api
 from app.loop.readings.by_hand import api as by_hand
@@ -197,6 +199,7 @@ ROUTERS: tuple[APIRouter, ...] = (
     text_api.router,
     alarms.router,
     alarm_load.router,
+    reactions.router,
     quarantine.router,
     control_plan.router,
     notes.router,
@@ -233,6 +236,7 @@ ROUTERS: tuple[APIRouter, ...] = (
     capability_pages.router,
     six_pack.router,
     alarm_load_pages.router,  # before the pages of alarms by their number
+    reaction_pages.router,  # /alarms/causes is no number of an alarm
     alarm_pages.router,
     quarantine_pages.router,
     control_plan_pages.router,

@@ -73,7 +73,7 @@ class Route:
     kinds, tones, machines, characteristics: the alarms, all where empty. hours: when it is open; always where empty.
     on_days_off: its hours begin on days off too. urgent: through the quiet hours of receivers. repeat: until acknowledged, 0
     not at all. digest: a first message waits so long for others. hold_off: the same trouble raised again within it is not
-    announced before it ends.
+    announced before it ends. only: numbers of alarms, of those who fit besides; None: all.
     """
 
     steps: tuple[Step, ...]
@@ -87,11 +87,13 @@ class Route:
     repeat: timedelta = NEVER
     digest: timedelta = NEVER
     hold_off: timedelta = NEVER
+    only: frozenset[int] | None = None
 
     def concerns(self, alarm: Raised) -> bool:
         """Tell if it is for this alarm."""
         return (
-            (not self.kinds or alarm.kind in self.kinds)
+            (self.only is None or alarm.id in self.only)
+            and (not self.kinds or alarm.kind in self.kinds)
             and (not self.tones or alarm.tone in self.tones)
             and (not self.machines or alarm.machine in self.machines)
             and (not self.characteristics or alarm.characteristic in self.characteristics)

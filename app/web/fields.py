@@ -57,7 +57,8 @@ def _slug(text: str) -> str:
     return text
 
 
-def _readable(text: str) -> str:
+def readable(text: str) -> str:
+    """The text; raises an error of pydantic if it holds a control character, or a sign that turns the order of what follows."""
     for character in text:
         if (unicodedata.category(character) in {"Cc", "Cs"} and character not in "\n\t") or character in _REORDERING:
             raise PydanticCustomError("control_character", "control character", {"code": f"U+{ord(character):04X}"})
@@ -70,7 +71,7 @@ def one_line(text: str) -> str:
         raise PydanticCustomError("one_line", "one line")
     for character in _UNSEEN.intersection(text):
         raise PydanticCustomError("control_character", "control character", {"code": f"U+{ord(character):04X}"})
-    return _readable(text)
+    return readable(text)
 
 
 def _written(value: Any) -> Any:
@@ -119,7 +120,7 @@ IN_UM = "typed in µm"
 Reason = Annotated[
     str,
     StringConstraints(strip_whitespace=True, min_length=1, max_length=1000),
-    AfterValidator(_readable),
+    AfterValidator(readable),
     CHOSEN,
     Field(description="Why, in words; it stays on record."),
 ]

@@ -8,6 +8,7 @@ _BEHIND: tuple[tuple[str, str], ...] = (
     (r"/station(/.*)?|/setup/stations", "how-to/stations"),
     (r"/alarms/[^/]+/affected|/quarantines(/.*)?", "how-to/quarantine"),
     (r"/alarms/load", "how-to/alarm-load"),
+    (r"/alarms/causes|/setup/reactions(/.*)?", "how-to/reaction-plans"),
     (r"/alarms(/.*)?|/todo", "how-to/acknowledge-alarms"),
     (r"/corrections(/.*)?", "how-to/approve-corrections"),
     (r"/machines/[^/]+/corrections/program", "how-to/program-text"),

@@ -52,6 +52,7 @@ ADDED: dict[str, dict[str, Any]] = {
     "correction": {"mapping": None},
     "baseline": {"shifts": None},
     "characteristic": {"form_of": None, "form": None},
+    "alarm": dict.fromkeys(("cause", "corrective_action", "reaction_plan", "reaction_version")),
     "reading_results": {"straightness": None},
     "report_job": {"person_id": None, "key_id": None},
     "outlook": dict.fromkeys(("record_of", "lives", "tested", "held", "widening")),
@@ -79,6 +80,8 @@ ADDED_TABLES = {
     "quarantined_part",
     "control_plan",
     "missed_measurement",
+    "reaction_plan",
+    "catalogue_entry",
 }
 
 

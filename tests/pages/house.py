@@ -112,6 +112,7 @@ PAGES = {
     "/alarms": ["/alarms", "/alarms?machine={machine}"],
     "/alarms/load": ["/alarms/load", "/alarms/load?machine={machine}"],
     "/alarms/history": ["/alarms/history"],
+    "/alarms/causes": ["/alarms/causes", "/alarms/causes?machine={machine}&from=2020-01-01&to=2020-01-02"],
     "/alarms/{number}": ["/alarms/{alarm}", "/alarms/{alarm}?action=keep_cutting"],
     "/alarms/{number}/affected": ["/alarms/{alarm}/affected"],
     "/quarantines": ["/quarantines", "/quarantines?state=all&machine={machine}"],
@@ -183,6 +184,9 @@ PAGES = {
     "/setup/notifications/routes/new": ["/setup/notifications/routes/new"],
     "/setup/notifications/routes/{route}": ["/setup/notifications/routes/{route}"],
     "/account/notifications": ["/account/notifications"],
+    "/setup/reactions": ["/setup/reactions"],
+    "/setup/reactions/new": ["/setup/reactions/new"],
+    "/setup/reactions/{plan}": ["/setup/reactions/{plan}"],
     "/kinematics/new": [
         "/kinematics/new",
         "/kinematics/new?way=positions",
@@ -351,7 +355,21 @@ def furnished(server: Server) -> Shop:
     rules: dict[str, Any] = {"every": 5, "minutes": 240.0, "per_shift": True, "after_change": 3, "after_alarm": 10}
     made.call("PUT", f"/characteristics/{made.characteristic}/control-plan", **rules, reason="As agreed with quality")
     _notified(made)
+    _with_plan(made)
     return made
+
+
+def _with_plan(made: Shop) -> None:
+    """A reaction plan for the alarm that is looked at, with something to choose, and an alarm with a cause."""
+    cause = made.call("POST", "/reactions/catalogue", 201, sort="cause", name="Chip between the part and the jaws")[
+        "id"
+    ]
+    made.call("POST", "/reactions/catalogue", 201, sort="action", name="Insert turned")
+    steps = [{"text": "Set the part aside."}, {"text": "Look at the edge " + "with the loupe, from all sides, " * 5}]
+    body: dict[str, Any] = {"characteristic": made.alarms()[0]["characteristic"], "steps": steps, "reason": "New"}
+    made.call("POST", "/reactions/plans", 201, name="Edge broken", **body)
+    made.read(20.0, made.another("seat"))
+    made.acknowledge(made.alarms()[-1]["id"], "noted", cause=cause)
 
 
 def _notified(made: Shop) -> None:
@@ -402,4 +420,5 @@ def values_of(shop: Shop) -> dict[str, Any]:
             "url"
         ].partition("#")[2],
         "route": shop.call("GET", "/notifications/routes")["items"][-1]["id"],
+        "plan": shop.call("GET", "/reactions/plans")["items"][-1]["id"],
     }

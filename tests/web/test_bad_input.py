@@ -89,6 +89,14 @@ RECEIVER: dict[str, Any] = {
     "away_until": "2026-11-21T08:15:02Z",
     "events": ["tool"],
 }
+REACTION: dict[str, Any] = {
+    "name": "Seat oversize",
+    "steps": [{"text": "Set the part aside."}],
+    "cause_needed": False,
+    "action_needed": False,
+    "receivers": [],
+    "reason": "First version",
+}
 BODIES: dict[str, dict[str, Any]] = {
     "POST /api/v1/notifications/routes": ROUTE,
     "PUT /api/v1/notifications/routes/{route}": ROUTE,
@@ -100,6 +108,11 @@ BODIES: dict[str, dict[str, Any]] = {
         "away_until": "2026-11-21T08:15:02Z",
         "shift_report": True,
     },
+    "POST /api/v1/reactions/plans": REACTION | {"characteristic": "{characteristic}", "rule": "nelson_1"},
+    "PUT /api/v1/reactions/plans/{plan}": REACTION | {"kind": "hunting"},
+    "POST /api/v1/reactions/plans/{plan}/withdraw": WHY,
+    "POST /api/v1/reactions/catalogue": {"sort": "cause", "name": "Chip on the stylus"},
+    "PATCH /api/v1/reactions/catalogue/{entry}": {"retired": False},
     "POST /api/v1/readings/aqdef": {"name": "bad.dfq", "content": AQDEF},
     "POST /api/v1/readings/table": {
         "name": "bad.csv",
@@ -553,6 +566,8 @@ class Place:
             "proposal": proposal["id"],
             "receiver": self.notified(shop),
             "route": 1,
+            "plan": shop.call("POST", "/reactions/plans", 201, **REACTION | {"kind": "hunting"})["id"],
+            "entry": shop.call("POST", "/reactions/catalogue", 201, sort="action", name="Insert turned")["id"],
             "delivery": 1,
             "form": "csv",
             "person": next(person[name] for name in ("id", "name", "key") if name in person),

@@ -10,7 +10,8 @@ offset_set      this offset is true: handled as a manual edit (*offset differs* 
 measured_by_hand  a person has measured the part: a size, a verdict or both, kept beside the reading; nothing else
 noted           nothing else; at *offset differs* the offset that the machine has reported is true
 
-Whichever it is, a characteristic or a tool that was paused by the alarm goes on.
+Whichever it is, a characteristic or a tool that was paused by the alarm goes on. The reaction plan that holds may ask for a cause
+and a corrective action of the plant's catalogue; the alarm keeps the version of the plan that it was handled with.
 """
 
 from collections.abc import Callable
@@ -28,6 +29,8 @@ from app.language.i18n import _
 from app.loop.alarm_response import by_hand, queries, wording
 from app.loop.alarm_response.by_hand import ByHand
 from app.loop.alarm_response.queries import AlarmRow
+from app.loop.alarm_response.reaction_queries import Handled, Reactions
+from app.loop.alarms.actions import news
 from app.loop.alarms.kinds import Action
 from app.loop.alarms.reading_kinds import HOLDING, IMPLAUSIBLE, TOOL_WORN
 from app.loop.machines.queries import lock_machines
@@ -44,6 +47,7 @@ from app.loop.tools.alarm_kinds import OFFSET_DIFFERS
 Outcome = list[dict[str, Any]]
 NO_OFFSET = 0.0
 NOT_MEASURED = ByHand()
+NOTHING_SAID = Handled()
 
 
 def acknowledge(
@@ -56,11 +60,13 @@ def acknowledge(
     offset: float | None = None,
     changed_by: str | None = None,
     hand: ByHand = NOT_MEASURED,
+    handled: Handled = NOTHING_SAID,
 ) -> AlarmRow:
     """Say what an active alarm was.
 
     ``offset`` (mm) is what the new tool starts with (`tool_replaced`), or the one that is true (`offset_set`, where
     ``changed_by`` says who has changed it at the control). ``hand``: what was found by hand, kept beside the reading.
+    ``handled``: cause and corrective action of the catalogue.
     Raises `NotFound`; `Conflict` when somebody was first, saying who; `Invalid` when the action cannot be meant.
     """
     lock_machines(session, [queries.alarm(session, number).alarm.machine_id])
@@ -74,7 +80,9 @@ def acknowledge(
             acknowledged_at=alarm.acknowledged_at.isoformat(),
             action=alarm.action,
         )
-    _refuse(row, action, offset, changed_by, hand)
+    reactions = Reactions(session)
+    _refuse(row, action, offset, changed_by, hand, reactions.wrong(row, handled))
+    plan = reactions.plan_of(row)
     follows: dict[Action, Callable[[], Outcome]] = {
         "tool_replaced": lambda: _tool_replaced(session, row, comment, caller, offset),
         "keep_cutting": lambda: _keep_cutting(session, row, comment, caller),
@@ -88,34 +96,37 @@ def acknowledge(
     outcome = [*measured, *follows[action](), *_resume(session, row)]
     alarm.acknowledged_at, alarm.acknowledged_by = datetime.now(UTC), caller.name
     alarm.action, alarm.comment, alarm.outcome = action, comment, outcome
+    alarm.cause, alarm.corrective_action = handled
+    if plan is not None:
+        alarm.reaction_plan, alarm.reaction_version = plan.id, plan.version
+    said = {
+        "cause": reactions.name_of(handled.cause),
+        "corrective_action": reactions.name_of(handled.corrective_action),
+    }
     record(
         session,
         caller.name,
         "alarm acknowledged",
         f"alarm/{alarm.id}",
         {"state": "active"},
-        {"state": "acknowledged", "action": action, "outcome": outcome},
+        {"state": "acknowledged", "action": action, "outcome": outcome}
+        | {name: text for name, text in said.items() if text is not None},
         comment,
     )
-    publish(
-        session,
-        {
-            "kind": "alarm",
-            "machine": row.machine.key,
-            "characteristic": row.characteristic.key if row.characteristic else None,
-            "tool": alarm.tool_memory,
-            "id": alarm.id,
-            "alarm": alarm.kind,
-            "state": "acknowledged",
-            "action": action,
-        },
-    )
+    key = row.characteristic.key if row.characteristic else None
+    publish(session, news(row.machine.key, alarm) | {"characteristic": key})
     return queries.alarm(session, number)
 
 
-def _refuse(row: AlarmRow, action: Action, offset: float | None, changed_by: str | None, hand: ByHand) -> None:
-    """Raises `Invalid` for an action that cannot be meant by this alarm."""
-    wrong: list[FieldError] = []
+def _refuse(
+    row: AlarmRow,
+    action: Action,
+    offset: float | None,
+    changed_by: str | None,
+    hand: ByHand,
+    wrong: list[FieldError],
+) -> None:
+    """Raises `Invalid` for an action that cannot be meant by this alarm, and for what is wrong already."""
     if offset is not None and action not in {"tool_replaced", "offset_set"}:
         wrong.append(
             FieldError(
@@ -150,7 +161,10 @@ def _refuse(row: AlarmRow, action: Action, offset: float | None, changed_by: str
     if wrong:
         raise Invalid(
             "; ".join(f"{error.field}: {error.message}" for error in wrong),
-            _("Choose another action, or correct the named fields. The alarm is still active."),
+            _(
+                "Choose another action, or correct the named fields. The alarm is still active. "
+                "Causes and corrective actions: GET /api/v1/reactions/catalogue."
+            ),
             errors=wrong,
         )
 

@@ -6,7 +6,8 @@ from fastapi import Path, Query
 
 from app.access.deps import AnyCaller, Operator
 from app.loop.alarm_response import queries
-from app.loop.alarm_response.queries import AlarmState
+from app.loop.alarm_response.queries import AlarmRow, AlarmState
+from app.loop.alarm_response.reaction_queries import Reactions
 from app.loop.alarm_response.schemas import AlarmOut, alarm_out
 from app.loop.alarm_response.verbs import ACKNOWLEDGE, OfAlarm
 from app.loop.characteristics.queries import characteristic_named
@@ -44,7 +45,8 @@ def list_alarms(
         after=after,
         limit=limit + 1,
     )
-    return page_of([alarm_out(row) for row in rows], limit, lambda alarm: alarm.id)
+    reactions = Reactions(session)
+    return page_of([alarm_out(row, reactions) for row in rows], limit, lambda alarm: alarm.id)
 
 
 @router.get("/alarms/{alarm}", responses=problems(404))
@@ -52,11 +54,15 @@ def get_alarm(session: SessionDep, caller: AnyCaller, alarm: Number) -> AlarmOut
     """One alarm, and what followed if it is acknowledged."""
     row = queries.alarm(session, alarm)
     caller.must_at(row.alarm.machine_id, "viewer")
-    return alarm_out(row)
+    return alarm_out(row, Reactions(session))
 
 
 def _alarm(session: SessionDep, caller: Operator, alarm: Number) -> OfAlarm:
     return OfAlarm(session, alarm, caller)
 
 
-draw(router, "/alarms/{alarm}/acknowledge", ACKNOWLEDGE, _alarm, lambda _on, row: alarm_out(row), AlarmOut)
+def _answer(on: OfAlarm, row: AlarmRow) -> AlarmOut:
+    return alarm_out(row, Reactions(on.session))
+
+
+draw(router, "/alarms/{alarm}/acknowledge", ACKNOWLEDGE, _alarm, _answer, AlarmOut)

@@ -5,6 +5,7 @@ from functools import partial
 from typing import Annotated
 
 from fastapi import APIRouter, Query, Request, Response
+from sqlalchemy.orm import Session
 from starlette.responses import RedirectResponse
 
 from app.access.deps import Caller, Operator, Viewer, require
@@ -12,6 +13,7 @@ from app.errors import Invalid
 from app.loop.alarm_response import queries, verbs, wording
 from app.loop.alarm_response.outcomes import outcomes
 from app.loop.alarm_response.queries import AlarmRow
+from app.loop.alarm_response.reaction_queries import Reactions
 from app.loop.machines import queries as machines
 from app.web.deps import FormDep, Number, SessionDep, Sought, Word
 from app.web.forms import by_field
@@ -49,6 +51,7 @@ def board(
         late=queries.alarm(session, late) if late else None,
         wording=wording,
         outcomes=outcomes,
+        reactions=Reactions(session),
         address=address,
     )
 
@@ -71,6 +74,7 @@ def history(
         machine=machine_row,
         wording=wording,
         outcomes=outcomes,
+        reactions=Reactions(session),
         address=address,
     )
 
@@ -85,11 +89,12 @@ def alarm_page(
     machine: Word = None,
 ) -> Response:
     """One alarm; with ``action`` it asks for the second touch."""
-    return _alarm(request, queries.alarm(session, number), caller, action, machine)
+    return _alarm(request, session, queries.alarm(session, number), caller, action, machine)
 
 
 def _alarm(
     request: Request,
+    session: Session,
     row: AlarmRow,
     caller: Caller,
     action: str | None,
@@ -110,6 +115,7 @@ def _alarm(
         errors=by_field(error) if error else {},
         wording=wording,
         outcomes=outcomes,
+        reactions=Reactions(session),
         address=address,
     )
 
@@ -121,5 +127,7 @@ def acknowledge(request: Request, session: SessionDep, caller: Operator, number:
     try:
         outcome = verbs.acknowledge(session, number, form, caller)
     except Invalid as error:
-        return _alarm(request, queries.alarm(session, number), caller, form.get("action"), machine, form, error)
+        return _alarm(
+            request, session, queries.alarm(session, number), caller, form.get("action"), machine, form, error
+        )
     return RedirectResponse(address("/alarms", machine=machine, **{outcome.kind: number}), 303)

@@ -8,8 +8,11 @@ from pydantic import BaseModel, ConfigDict, Field
 from app.core.parameters import LARGEST_LENGTH
 from app.loop.alarm_response import outcomes, wording
 from app.loop.alarm_response.queries import AlarmRow
+from app.loop.alarm_response.reaction_queries import Reactions
 from app.loop.alarms.kinds import Action
 from app.web.fields import LARGEST_ID, Body, Reason, Text200, answer_from
+
+EntryNumber = Annotated[int, Field(strict=True, ge=1, le=LARGEST_ID)]
 
 
 class AlarmAcknowledgeIn(Body):
@@ -53,6 +56,32 @@ class AlarmAcknowledgeIn(Body):
             description="Of which reading; of the last one behind the alarm if left out.",
         ),
     ] = None
+    cause: Annotated[
+        EntryNumber | None, Field(description="Number of a cause of the catalogue; needed where the plan asks for it.")
+    ] = None
+    corrective_action: Annotated[
+        EntryNumber | None,
+        Field(description="Number of a corrective action of the catalogue; needed where the plan asks for it."),
+    ] = None
+
+
+class CatalogueChoice(BaseModel):
+    """An entry of the catalogue."""
+
+    id: int
+    name: str
+
+
+class PlanOfAlarm(BaseModel):
+    """The reaction plan of an alarm; `GET /reactions/plans/{plan}?version=` has its steps."""
+
+    plan: Annotated[int, Field(description="Number of the plan.")]
+    version: Annotated[
+        int, Field(description="While the alarm is active the one in force, then the one it was handled with.")
+    ]
+    name: str
+    cause_needed: Annotated[bool, Field(description="It cannot be acknowledged without a cause.")]
+    action_needed: Annotated[bool, Field(description="It cannot be acknowledged without a corrective action.")]
 
 
 class HeldCorrection(BaseModel):
@@ -104,12 +133,21 @@ class AlarmOut(BaseModel):
     action: Annotated[Action | None, Field(description="The answer: what was done.")]
     comment: Annotated[str | None, Field(description="What the person said.")]
     outcome: Annotated[list[Followed] | None, Field(description="What followed; none while it is active.")]
+    reaction_plan: Annotated[PlanOfAlarm | None, Field(description="What to do about it; null: there is no plan.")]
+    cause: Annotated[CatalogueChoice | None, Field(description="The cause that was chosen.")]
+    corrective_action: Annotated[CatalogueChoice | None, Field(description="The corrective action that was chosen.")]
 
 
-def alarm_out(row: AlarmRow) -> AlarmOut:
+def alarm_out(row: AlarmRow, reactions: Reactions) -> AlarmOut:
     """An alarm as it is answered."""
     alarm, held = row.alarm, row.held
     done = alarm.acknowledged_at is not None
+    plan = reactions.plan_of(row)
+
+    def chosen(number: int | None) -> CatalogueChoice | None:
+        name = reactions.name_of(number)
+        return None if number is None or name is None else CatalogueChoice(id=number, name=name)
+
     return answer_from(
         AlarmOut,
         alarm,
@@ -120,4 +158,7 @@ def alarm_out(row: AlarmRow) -> AlarmOut:
         what_to_do=wording.what_to_do(alarm.kind),
         held_correction=None if held is None else HeldCorrection(number=held.number, amount=held.amount),
         outcome=[Followed(**item) for item in outcomes.outcomes(alarm.outcome)] if done else None,
+        reaction_plan=None if plan is None else answer_from(PlanOfAlarm, plan, plan=plan.id),
+        cause=chosen(alarm.cause),
+        corrective_action=chosen(alarm.corrective_action),
     )

@@ -10,6 +10,7 @@ from app.access.callers import Caller
 from app.loop.alarm_response import acknowledging, queries
 from app.loop.alarm_response.by_hand import ByHand
 from app.loop.alarm_response.queries import AlarmRow
+from app.loop.alarm_response.reaction_queries import Handled
 from app.loop.alarm_response.schemas import AlarmAcknowledgeIn
 from app.web.verb import Act, Outcome, carry_out
 
@@ -43,6 +44,9 @@ def acknowledge_alarm(on: OfAlarm, given: AlarmAcknowledgeIn) -> AlarmRow:
     What was measured by hand (`hand_measured`, `hand_verdict`) is kept beside the machine's value of the last reading behind
     the alarm, or of `hand_sequence`; that reading is neither excluded nor decided again.
 
+    `cause` and `corrective_action` are entries of the plant's catalogue. The reaction plan of the alarm may ask for them
+    (`reaction_plan`): 422 where one is missing.
+
     After a probe fault the paused characteristic goes on, after *offset differs* the paused tool, whichever it was. Acknowledging twice is 409 and says who was
     first.
     """
@@ -55,6 +59,7 @@ def acknowledge_alarm(on: OfAlarm, given: AlarmAcknowledgeIn) -> AlarmRow:
         offset=given.offset,
         changed_by=given.changed_by,
         hand=ByHand(given.hand_measured, given.hand_verdict, given.hand_sequence),
+        handled=Handled(given.cause, given.corrective_action),
     )
 
 

@@ -15,6 +15,7 @@ from app.db.events import publish
 from app.db.tables import Event
 from app.errors import Conflict, FieldError, Invalid, NotFound
 from app.language.i18n import _
+from app.loop.alarm_response.reaction_queries import plans_in_force
 from app.loop.alarms.kinds import kinds
 from app.loop.notifications import queries
 from app.loop.notifications.addresses import Refused, check
@@ -154,13 +155,19 @@ def change_receiver(
 
 
 def delete_receiver(session: Session, number: int, caller: Caller) -> None:
-    """Delete a receiver. Raises `NotFound`; `Conflict` while a route names it."""
+    """Delete a receiver. Raises `NotFound`; `Conflict` while a route or a reaction plan names it."""
     row = queries.receiver(session, number, hold=True)
     used = queries.routes_to(session, number)
     if used:
         raise Conflict(
             _("The route “{name}” names this receiver.").format(name=used[0].name),
             _("Take it out of the route first, or delete the route."),
+        )
+    named = next((plan for plan in plans_in_force(session) if number in plan.receivers), None)
+    if named is not None:
+        raise Conflict(
+            _("The reaction plan “{name}” names this receiver.").format(name=named.name),
+            _("Have it taken out of the plan first."),
         )
     row.deleted_at = datetime.now(UTC)
     row.secret = None

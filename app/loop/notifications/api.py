@@ -99,7 +99,7 @@ def change_receiver(
 
 @router.delete("/notifications/receivers/{receiver}", status_code=204, responses=problems(404, 409))
 def delete_receiver(session: SessionDep, caller: Admin, receiver: ReceiverId) -> Response:
-    """Delete a receiver; 409 while a route names it. Its deliveries stay on record."""
+    """Delete a receiver; 409 while a route or a reaction plan names it. Its deliveries stay on record."""
     actions.delete_receiver(session, receiver, caller)
     return Response(status_code=204)
 

@@ -4,6 +4,7 @@ One process plans at a time. A delivery that it has begun is its own until `BUSY
 in it is sent again.
 """
 
+from collections import defaultdict
 from collections.abc import Callable, Iterable
 from datetime import date, datetime, timedelta
 from typing import Any
@@ -14,11 +15,12 @@ from sqlalchemy.orm import Session
 
 from app.access.queries import WITHOUT_ACCESS
 from app.core import notify
-from app.core.notify import Notice, Raised, Record, notices, pause_after
+from app.core.notify import NEVER, Notice, Raised, Record, Route, Step, notices, pause_after
 from app.db.events import publish
 from app.db.tables import Event
 from app.language.times import end_of_shift, plant_zone
 from app.loop.alarm_response.queries import AlarmRow, alarm
+from app.loop.alarm_response.reaction_queries import Reactions, plans_in_force, trouble_of
 from app.loop.alarms.kinds import kind_named
 from app.loop.notifications import message
 from app.loop.notifications.means import Answer, Job, Message
@@ -33,6 +35,8 @@ KEPT = timedelta(days=31)
 """Time that deliveries stay on record, and what was announced."""
 CHATTER = timedelta(days=7)
 """As far back as the same alarm is looked for: the longest hold-off."""
+HOLD_OFF = timedelta(minutes=5)
+"""In which those whom a reaction plan names are not notified of the same trouble again, as a route has it by itself."""
 SETTLED, OLDEST_SHIFT = timedelta(minutes=5), timedelta(hours=24)
 MOST_ALARMS = 5_000
 MOST_AT_ONCE = 16
@@ -159,7 +163,8 @@ def _about_alarms(
     session: Session, rows: dict[int, Receiver], free: set[int], address: str, days_off: frozenset[date], now: datetime
 ) -> list[Job]:
     stored = session.scalars(select(NotificationRoute.rule).where(NotificationRoute.enabled)).all()
-    active = _active(session) if stored else []
+    planned = [plan for plan in plans_in_force(session) if plan.receivers]
+    active = _active(session) if stored or planned else []
     if not active:
         return []
     receivers = {
@@ -174,8 +179,35 @@ def _about_alarms(
         for number, row in rows.items()
     }
     routes = [Rule.model_validate(rule).value() for rule in stored]
+    if planned:
+        routes += _of_plans(session)
     found = notices(routes, receivers, active, _record(session, active, now), now, plant_zone(), days_off)
     return [_alarm_job(session, rows[notice.receiver], notice, address) for notice in found[:MOST_AT_ONCE]]
+
+
+def _of_plans(session: Session) -> list[Route]:
+    """A route for each reaction plan that names receivers, of the active alarms that it holds for."""
+    reactions, those = Reactions(session), defaultdict[int, set[int]](set)
+    receivers: dict[int, tuple[int, ...]] = {}
+    rows = session.execute(
+        select(Alarm.id, Alarm.kind, Alarm.data, Characteristic.key)
+        .outerjoin(
+            Characteristic,
+            (Characteristic.machine_id == Alarm.machine_id) & (Characteristic.id == Alarm.characteristic_id),
+        )
+        .where(Alarm.acknowledged_at.is_(None))
+        .order_by(Alarm.id.desc())
+        .limit(MOST_ALARMS)
+    )
+    for number, kind, data, key in rows:
+        plan = reactions.for_trouble(trouble_of(kind, key, data))
+        if plan is not None and plan.receivers:
+            those[plan.id].add(number)
+            receivers[plan.id] = tuple(plan.receivers)
+    return [
+        Route((Step(NEVER, receivers[plan]),), only=frozenset(numbers), hold_off=HOLD_OFF)
+        for plan, numbers in those.items()
+    ]
 
 
 def _alarm_job(session: Session, row: Receiver, notice: Notice, address: str) -> Job:

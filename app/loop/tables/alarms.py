@@ -61,3 +61,7 @@ class Alarm(Base):
     action: Mapped[str | None]
     comment: Mapped[str | None]
     outcome: Mapped[list[Any] | None]  # what followed, as codes with values
+    cause: Mapped[int | None] = mapped_column(BigInteger)  # of the plant's catalogue, as the corrective action
+    corrective_action: Mapped[int | None] = mapped_column(BigInteger)
+    reaction_plan: Mapped[int | None] = mapped_column(BigInteger)  # by which it was handled, and its version
+    reaction_version: Mapped[int | None]

@@ -24,6 +24,7 @@ def setup_page(
         tabs.append(("screens", _("Wall screens"), "/setup/screens"))
         tabs.append(("notifications", _("Notifications"), "/setup/notifications"))
     if caller.may("engineer"):
+        tabs.append(("reactions", _("Reaction plans"), "/setup/reactions"))
         tabs.append(("audit", _("Record of changes"), "/setup/audit"))
         tabs.append(("jobs", _("Background jobs"), "/setup/jobs"))
     return page(

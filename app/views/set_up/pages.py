@@ -13,6 +13,7 @@ from app.views.set_up import (
     notification_pages,
     people_pages,
     program_pages,
+    reaction_pages,
     screen_pages,
     station_pages,
 )
@@ -30,6 +31,7 @@ for part in (
     characteristic_pages,
     many_pages,
     program_pages,
+    reaction_pages,
     people_pages,
     station_pages,
     screen_pages,

@@ -22,6 +22,7 @@ from app.loop.alarm_response import verbs as alarm_verbs
 from app.loop.alarm_response import wording as alarm_wording
 from app.loop.alarm_response.outcomes import outcomes
 from app.loop.alarm_response.queries import AlarmRow
+from app.loop.alarm_response.reaction_queries import Reactions
 from app.loop.machines.queries import machine_named
 from app.loop.notes import queries as notes
 from app.loop.notes.form_reader import write_as_typed
@@ -141,6 +142,7 @@ def station_page(
         next_event=lambda row: next_event(row.outlook),
         wording=alarm_wording,
         outcomes=outcomes,
+        reactions=Reactions(session),
         address=address,
     )
     if at.device is not None:
@@ -185,6 +187,7 @@ def _ask_alarm(
         action=action,
         **asked(session, at, form, error),
         wording=alarm_wording,
+        reactions=Reactions(session),
         address=address,
     )
 
