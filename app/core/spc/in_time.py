@@ -219,15 +219,15 @@ def decompose(groups: Sequence[ArrayLike], at: ArrayLike) -> Parts:
     slope = float(sizes @ (off * means)) / squares if squares > 0 else 0.0
     regression = min(between, slope * slope * squares)
     return Parts(
-        between,
-        regression,
-        between - regression,
-        within,
-        slope,
-        _f(between, k - 1, within, n - k, reach),
-        _f(regression, 1, within, n - k, reach),
-        _f(between - regression, k - 2, within, n - k, reach),
-        _f(regression, 1, between - regression, k - 2, reach),
+        between=between,
+        regression=regression,
+        lack_of_fit=between - regression,
+        within=within,
+        slope=slope,
+        means=_f(between, k - 1, within, n - k, reach),
+        line=_f(regression, 1, within, n - k, reach),
+        beside_line=_f(between - regression, k - 2, within, n - k, reach),
+        line_over_rest=_f(regression, 1, between - regression, k - 2, reach),
     )
 
 

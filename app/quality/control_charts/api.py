@@ -247,17 +247,17 @@ def get_baseline_editor(
     window = statistics.window_of(session, current.characteristic, **choice._asdict())
     given = {"centre": centre, "sigma": sigma, "lower": lower, "upper": upper}
     picked = EditorChoice(
-        quantity,
-        chart,
-        grouping,
-        group_size,
-        group_pause,
-        pooled,
-        settle,
-        first_sequence,
-        last_sequence,
-        excluded,
-        {name: value for name, value in given.items() if value is not None},
+        quantity=quantity,
+        chart=chart,
+        grouping=grouping,
+        group_size=group_size,
+        group_pause=group_pause,
+        pooled=pooled,
+        settle=settle,
+        first=first_sequence,
+        last=last_sequence,
+        excluded=excluded,
+        limits={name: value for name, value in given.items() if value is not None},
     )
     view, marked = picture_of(session, current, picked, window)
     return chart_answer(control_figure(view, key=characteristic, marked=marked, width=width, picks=True), theme)

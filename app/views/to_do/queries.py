@@ -112,16 +112,16 @@ def _alarms(session: Session, machine: Machine | None) -> Iterator[Task]:
         if not about and alarm.tool_memory:
             about = _("Tool {number}").format(number=alarm.tool_memory)
         yield Task(
-            "alarm",
-            alarm.kind,
-            wording.kind_word(alarm.kind),
-            row.machine,
-            about,
-            wording.sentence(alarm),
-            alarm.raised_at,
-            _("Acknowledge"),
-            f"/alarms/{alarm.id}",
-            "operator",
+            kind="alarm",
+            state=alarm.kind,
+            word=wording.kind_word(alarm.kind),
+            machine=row.machine,
+            about=about,
+            sentence=wording.sentence(alarm),
+            since=alarm.raised_at,
+            action=_("Acknowledge"),
+            path=f"/alarms/{alarm.id}",
+            role="operator",
         )
 
 
@@ -141,19 +141,19 @@ def _corrections(session: Session, machine: Machine | None) -> Iterator[Task]:
         query = query.where(Correction.machine_id == machine.id)
     for correction, at, name in session.execute(query):
         yield Task(
-            "correction",
-            correction.status,
-            word_of(correction.status),
-            at,
-            name,
-            _("Tool {number}: correction of {amount}").format(
+            kind="correction",
+            state=correction.status,
+            word=word_of(correction.status),
+            machine=at,
+            about=name,
+            sentence=_("Tool {number}: correction of {amount}").format(
                 number=correction.tool_memory, amount=um(correction.amount)
             ),
-            correction.created_at,
-            _("Decide"),
-            f"/corrections?machine={at.key}#correction-{correction.number}",
-            "operator",
-            correction.number,
+            since=correction.created_at,
+            action=_("Decide"),
+            path=f"/corrections?machine={at.key}#correction-{correction.number}",
+            role="operator",
+            number=correction.number,
         )
 
 
@@ -161,18 +161,18 @@ def _quarantines(session: Session, machine: Machine | None) -> Iterator[Task]:
     rows = quarantine.quarantines(session, machine_id=machine.id if machine else None, state="open", limit=MOST)
     for row in reversed(rows):
         yield Task(
-            "quarantine",
-            "quarantined",
-            _("Quarantine"),
-            row.machine,
-            _("Alarm {number}").format(number=row.quarantine.alarm_id),
-            ngettext("{n} part is set aside: {why}", "{n} parts are set aside: {why}", row.open).format(
+            kind="quarantine",
+            state="quarantined",
+            word=_("Quarantine"),
+            machine=row.machine,
+            about=_("Alarm {number}").format(number=row.quarantine.alarm_id),
+            sentence=ngettext("{n} part is set aside: {why}", "{n} parts are set aside: {why}", row.open).format(
                 n=row.open, why=row.quarantine.reason
             ),
-            row.quarantine.made_at,
-            _("Decide"),
-            f"/quarantines/{row.quarantine.id}",
-            "operator",
+            since=row.quarantine.made_at,
+            action=_("Decide"),
+            path=f"/quarantines/{row.quarantine.id}",
+            role="operator",
         )
 
 
@@ -181,32 +181,32 @@ def _proposals(session: Session, machine: Machine | None) -> Iterator[Task]:
         rows = what_if.proposals(session, machine_id=machine.id if machine else None, status=status, limit=MOST)
         for row in reversed(rows):
             yield Task(
-                "proposal",
-                "awaiting_approval",
-                _("Proposal") if status == "open" else _("Outdated proposal"),
-                row.machine,
-                row.characteristic.name,
-                _("{who} proposes other parameters: {why}").format(
+                kind="proposal",
+                state="awaiting_approval",
+                word=_("Proposal") if status == "open" else _("Outdated proposal"),
+                machine=row.machine,
+                about=row.characteristic.name,
+                sentence=_("{who} proposes other parameters: {why}").format(
                     who=row.proposal.proposed_by, why=row.proposal.reason
                 ),
-                row.proposal.proposed_at,
-                _("Decide"),
-                f"/proposals/{row.proposal.id}",
-                "engineer",
+                since=row.proposal.proposed_at,
+                action=_("Decide"),
+                path=f"/proposals/{row.proposal.id}",
+                role="engineer",
             )
 
 
 def _jobs(session: Session) -> Iterator[Task]:
     for failure in session.scalars(select(JobFailure).order_by(JobFailure.first_at).limit(MOST)):
         yield Task(
-            "job",
-            "probe_fault",
-            _("Background job fails"),
-            None,
-            job_word(failure.job),
-            f"{failure.subject}: {failure.error}" if failure.subject else failure.error,
-            failure.first_at,
-            _("Look"),
-            "/setup/jobs",
-            "engineer",
+            kind="job",
+            state="probe_fault",
+            word=_("Background job fails"),
+            machine=None,
+            about=job_word(failure.job),
+            sentence=f"{failure.subject}: {failure.error}" if failure.subject else failure.error,
+            since=failure.first_at,
+            action=_("Look"),
+            path="/setup/jobs",
+            role="engineer",
         )
