@@ -6,7 +6,7 @@ import io
 import json
 from collections.abc import Iterator
 from contextlib import closing
-from datetime import UTC, datetime
+from datetime import UTC, datetime, timedelta
 from itertools import islice
 from pathlib import Path
 from typing import Any
@@ -15,8 +15,10 @@ import httpx
 import numpy as np
 import psycopg
 import pytest
+from sqlalchemy import text
 
 from app.core.decision.limits import Zone
+from app.core.period import Period
 from app.db.engine import Database
 from app.jobs.actions import run_jobs
 from app.loop.characteristics import actions as characteristics
@@ -31,6 +33,7 @@ from app.loop.readings.writer import group_commit
 from app.loop.summaries.queries import history, history_of, window_of
 from app.loop.summaries.queries.window import Window
 from app.loop.tables.readings import ResultReading
+from app.views.shift import queries as shift
 from bench.plant import PARAMETERS
 from tests.conftest import MANY, RunServer, drop_database, in_database
 from tests.forked import inband
@@ -60,6 +63,18 @@ def answered(client: httpx.Client, path: str, **query: Any) -> httpx.Response:
     answer = client.get(path, params=query)
     assert answer.status_code == 200, f"{path}: {answer.status_code} {answer.text[:300]}"
     return answer
+
+
+def test_a_shift_among_them_is_found_by_its_block_ranges(many_readings: Database) -> None:
+    with many_readings.begin() as session:
+        last = session.scalars(text("SELECT max(measured_at) FROM reading")).one()
+        period = Period(last - timedelta(hours=8), last)
+        plan = "\n".join(session.scalars(text(f"EXPLAIN {shift.READINGS}"), shift.where_of(session, period, None)))
+        made = sum(shift.made_in(session, period).values(), shift.Made())
+        counted = text("SELECT count(*) FROM reading WHERE measured_at >= :start AND measured_at < :end")
+        assert made.readings == session.scalars(counted, {"start": period.start, "end": period.end}).one() > 0
+    assert "reading_received_idx" in plan
+    assert "Seq Scan on reading" not in plan
 
 
 class TestExport:

@@ -35,7 +35,7 @@ EARLIEST_YEAR = 1900
 
 # A part counts once, by the last reading of each of its characteristics: one that was cut again and measured good is good.
 # A reading is judged by its raw deviation and the tolerance of the version that was in force, as everywhere.
-_READINGS = f"""
+READINGS = f"""
 WITH judged AS MATERIALIZED (
     SELECT r.machine_id, r.characteristic_id, r.sequence, r.part, r.measured_at, r.correction,
         e.sequence IS NOT NULL AS excluded, r.zone = '{Zone.PROBE_FAULT.value}' AS fault,
@@ -243,16 +243,20 @@ def shift(session: Session, at: datetime, now: datetime, machine: str | None = N
     )
 
 
-def made_in(session: Session, period: Period, machine_id: int | None = None) -> dict[int, Made]:
-    """Measured parts and corrections of a bounded period by the id of the machine, of all machines or of one."""
+def where_of(session: Session, period: Period, machine_id: int | None) -> dict[str, Any]:
+    """The parameters of `READINGS`: the period, the machine, and the tolerance of every version of the parameters."""
     where: dict[str, Any] = {"start": period.start, "end": period.end, "machine": machine_id}
     versions = session.execute(text(_VERSIONS), where).all()
-    columns = {
+    return where | {
         "characteristics": [row[0] for row in versions],
         "versions": [row[1] for row in versions],
         "tolerances": [nanometres(half_width(width, natural)) for _number, _version, width, natural in versions],
     }
-    rows = session.execute(text(_READINGS), where | columns).mappings()
+
+
+def made_in(session: Session, period: Period, machine_id: int | None = None) -> dict[int, Made]:
+    """Measured parts and corrections of a bounded period by the id of the machine, of all machines or of one."""
+    rows = session.execute(text(READINGS), where_of(session, period, machine_id)).mappings()
     return {row["machine_id"]: Made(**{field.name: row[field.name] for field in fields(Made)}) for row in rows}
 
 
