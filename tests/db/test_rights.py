@@ -29,6 +29,7 @@ PASSING = {
     "calibration_plan",
     "capability_verdict",
     "connection",
+    "control_plan",
     "delivery",
     "event",
     "fixture",

@@ -20,7 +20,7 @@ def groups() -> list[Group]:
     how_to = [
         (
             _("On the shop floor"),
-            "acknowledge-alarms reaction-plans quarantine stations sizes-by-hand approve-corrections change-tools notifications shift wall-screen alarm-load connections",
+            "acknowledge-alarms control-plan reaction-plans quarantine stations sizes-by-hand approve-corrections change-tools notifications shift wall-screen alarm-load connections",
         ),
         (
             _("Set up"),
