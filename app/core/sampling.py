@@ -120,7 +120,7 @@ def proposal(process: Process, most_ppm: float = USUAL_PPM) -> Proposal:
 
 
 def saved(every: int, seconds: float, parts: int = 1_000) -> float:
-    """Seconds of measuring that are saved in so many parts. seconds: that one measurement takes.
+    """Seconds of measuring that are saved in N parts. seconds: that one measurement takes.
 
     >>> saved(5, 12.0)
     9600.0

@@ -9,9 +9,9 @@ from app.quality.sampling.queries import Sampling
 
 
 class RiskOut(BaseModel):
-    """The risk of measuring 1 in so many parts."""
+    """The risk of measuring 1 in N parts."""
 
-    every: Annotated[int, Field(description="1 in so many parts is measured.")]
+    every: Annotated[int, Field(description="1 in N parts is measured.")]
     ppm: Annotated[float, Field(description="Parts per million that would go out of tolerance unmeasured.")]
     seconds_saved: Annotated[
         float | None, Field(description="Seconds of measuring saved in 1,000 parts; null: no `seconds` was named.")
