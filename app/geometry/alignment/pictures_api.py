@@ -17,7 +17,7 @@ from app.language.i18n import _
 from app.loop.machines.queries import machine_for, machine_of
 from app.loop.machines.wording import file_name, no_old_offset, no_such_offset
 from app.loop.timeline.queries import with_events_of_machine
-from app.web.api import FIGURE, MachineKey, Theme, api_router, chart_answer, plain, problems
+from app.web.api import FIGURE, MachineKey, Theme, Width, api_router, chart_answer, plain, problems
 from app.web.deps import SessionDep
 from app.web.downloads import download
 from app.web.fields import Control
@@ -92,6 +92,7 @@ def alignment_trend_figure(
         Query(description="The name that alignments were given.", min_length=1, max_length=200, examples=["pallet 4"]),
     ],
     theme: Theme = "light",
+    width: Width = 1240,
 ) -> Response:
     """Shifts and turns of what was aligned under one name over time, as a Plotly figure."""
     machine_row = machine_for(session, caller, machine, "viewer")
@@ -105,4 +106,4 @@ def alignment_trend_figure(
         trends.Mark(row.aligned_at, row.id, row.result["shift"], row.result["angles"], bool(row.result.get("misfits")))
         for row in rows
     ]
-    return chart_answer(with_events_of_machine(session, machine_row, trends.trend(marks)), theme)
+    return chart_answer(with_events_of_machine(session, machine_row, trends.trend(marks), width), theme)

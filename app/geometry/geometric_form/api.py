@@ -20,6 +20,7 @@ from app.web.api import (
     MachineFilter,
     MachineKey,
     Theme,
+    Width,
     api_router,
     chart_answer,
     problems,
@@ -120,6 +121,7 @@ def form_trend_figure(
     feature: Annotated[Slug, Path(description="The key of the feature.", examples=["bore-d50-axis"])],
     kind: Annotated[KindName | None, Query(description="Only of this kind.")] = None,
     theme: Theme = "light",
+    width: Width = 1240,
 ) -> Response:
     """The deviations of a feature over time as a Plotly figure, with tolerance and uncertainty."""
     machine_row = machine_for(session, caller, machine, "viewer")
@@ -142,7 +144,7 @@ def form_trend_figure(
         )
         for row in rows
     ]
-    return chart_answer(with_events_of_machine(session, machine_row, figures.trend(marks)), theme)
+    return chart_answer(with_events_of_machine(session, machine_row, figures.trend(marks), width), theme)
 
 
 def _seen(session: SessionDep, caller: Caller, number: int) -> FormRow:

@@ -32,6 +32,7 @@ from app.web.api import (
     MachineKey,
     SerialAfter,
     Theme,
+    Width,
     api_router,
     chart_answer,
     problems,
@@ -224,6 +225,7 @@ def kinematics_drift_figure(
     value: Annotated[str, Query(max_length=20, description="EX0C, Q146, backlash.C …", examples=["EX0C"])],
     head: Annotated[HeadName, Query(description="With this head.")] = "",
     theme: Theme = "light",
+    width: Width = 1240,
 ) -> Response:
     """A value over the runs with its limit, what has been entered, and the trend."""
     machine_row = machine_for(session, caller, machine, "viewer")
@@ -231,7 +233,7 @@ def kinematics_drift_figure(
         raise Invalid.at("value", _("there is no such value; there are EX0C, EY0C, EA0C, Q141 to Q149, backlash.C …"))
     limits = queries.plan(session, machine_row.id).limits
     course = drift(value, run_history.measured(session, machine_row, head), limits.get(value))
-    return chart_answer(with_events_of_machine(session, machine_row, figures.course(course)), theme)
+    return chart_answer(with_events_of_machine(session, machine_row, figures.course(course), width), theme)
 
 
 @router.get("/machines/{machine}/kinematics/backups", responses=problems(404))

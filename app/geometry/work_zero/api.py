@@ -30,6 +30,7 @@ from app.web.api import (
     MachineFilter,
     MachineKey,
     Theme,
+    Width,
     api_router,
     chart_answer,
     plain,
@@ -111,6 +112,7 @@ def fixture_figure(
     machine: MachineKey,
     fixture: FixtureKey,
     theme: Theme = "light",
+    width: Width = 1240,
     limit: Limit = 200,
 ) -> Response:
     """The shift of a fixture over its last zeros as a Plotly figure."""
@@ -127,7 +129,7 @@ def fixture_figure(
         for comparison in queries.history(session, machine_row, row.key, limit=limit)
     ]
     figure = figures.shift_figure(marks, row.settings.warning, row.settings.alarm)
-    return chart_answer(with_events_of_machine(session, machine_row, figure), theme)
+    return chart_answer(with_events_of_machine(session, machine_row, figure, width), theme)
 
 
 @router.get("/work-zeros/{number}", responses=problems(404))

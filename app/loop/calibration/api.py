@@ -30,6 +30,7 @@ from app.web.api import (
     MachineKey,
     SerialAfter,
     Theme,
+    Width,
     api_router,
     chart_answer,
     problems,
@@ -228,6 +229,7 @@ def calibration_figure(
     machine: MachineKey,
     location: R11,
     theme: Theme = "light",
+    width: Width = 1240,
     limit: Limit = 200,
 ) -> Response:
     """The history of a location as a Plotly figure: differences, empirical value, limits R33 and R34."""
@@ -238,7 +240,9 @@ def calibration_figure(
     changes = queries.value_changes(session, machine_row, location, limit)
     marks = [mark_of(row) for row in reversed(rows)]
     chart = figures.gauge_figure(marks, sorted((change.since, change.value) for change in changes), value)
-    return chart_answer(with_events_of_machine(session, machine_row, chart, place=place, without=(CALIBRATION,)), theme)
+    return chart_answer(
+        with_events_of_machine(session, machine_row, chart, width, place=place, without=(CALIBRATION,)), theme
+    )
 
 
 @router.get("/machines/{machine}/tools/{tool}/calibration-figure", responses=problems(404) | FIGURE)
@@ -248,6 +252,7 @@ def ring_figure(
     machine: MachineKey,
     tool: R10,
     theme: Theme = "light",
+    width: Width = 1240,
     limit: Limit = 200,
 ) -> Response:
     """The history of a probe in the ring as a Plotly figure: how far it stood beside the spindle, and the diameters."""
@@ -256,4 +261,6 @@ def ring_figure(
     queries.value_of(session, machine_row, place)
     rows = queries.calibrations(session, machine_row, place, newest_first=True, limit=limit)
     chart = figures.ring_figure([mark_of(row) for row in reversed(rows)])
-    return chart_answer(with_events_of_machine(session, machine_row, chart, place=place, without=(CALIBRATION,)), theme)
+    return chart_answer(
+        with_events_of_machine(session, machine_row, chart, width, place=place, without=(CALIBRATION,)), theme
+    )

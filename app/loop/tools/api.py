@@ -33,7 +33,7 @@ from app.loop.tools.schemas import (
     tool_set,
 )
 from app.loop.tools.verbs import CORRECTION, OfCorrection
-from app.web.api import FIGURE, Limit, MachineKey, SerialAfter, Theme, api_router, chart_answer, problems
+from app.web.api import FIGURE, Limit, MachineKey, SerialAfter, Theme, Width, api_router, chart_answer, problems
 from app.web.deps import DoorSessionDep, SessionDep
 from app.web.etags import TAGGED, guarded, tagged
 from app.web.fields import Page, page_of
@@ -131,6 +131,7 @@ def tool_figure(
     machine: MachineKey,
     tool: R10,
     theme: Theme = "light",
+    width: Width = 1240,
     limit: Limit = 500,
 ) -> Response:
     """The history of the offset as a Plotly figure: `{"data", "layout"}`."""
@@ -139,7 +140,7 @@ def tool_figure(
     steps = reversed(queries.offset_history(session, machine_row, tool, limit=limit))
     changes = [OffsetChange(step.event.at, step.event.offset_after, step.kind, wording.step(step)) for step in steps]
     chart = offset_figure(changes)
-    return chart_answer(with_events_of_machine(session, machine_row, chart, tool=tool, without=DRAWN), theme)
+    return chart_answer(with_events_of_machine(session, machine_row, chart, width, tool=tool, without=DRAWN), theme)
 
 
 # --- average memory

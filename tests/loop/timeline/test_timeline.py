@@ -1,10 +1,12 @@
 """Events above charts: which are drawn, where, and how they make room for each other."""
 
+import ast
 import itertools
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
 from typing import Any
 
+import app
 from app.charts import Axis, Chart, Panel, Series, svg, time_axis, to_drawing, to_plotly
 from app.loop.timeline.figures import CALIBRATION, PARAMETERS, TOOL_CHANGE, Event, with_lane
 from tests.loop.readings.importing.test_history import run, table
@@ -163,3 +165,15 @@ def test_an_event_of_today_is_none_of_a_past_that_is_imported_later(shop: Shop, 
     figure = shop.call("GET", f"/characteristics/{shop.characteristic}/figures/run")
     (change,) = (at for at, words in zip(events_of(figure)["x"], said(events_of(figure)), strict=True) if "T3" in words)
     assert datetime.fromisoformat(change) > START, "not in March, when the parts of the file were measured"
+
+
+def test_every_chart_of_a_page_says_how_wide_it_is() -> None:
+    """Or words of a wide chart are written over each other on a narrow one."""
+    calls = [
+        (path.name, node)
+        for path in Path(app.__path__[0]).rglob("*api.py")
+        for node in ast.walk(ast.parse(path.read_text("utf-8")))
+        if isinstance(node, ast.Call) and ast.unparse(node.func).rpartition(".")[2].startswith("with_events")
+    ]
+    assert len(calls) > 10
+    assert [name for name, call in calls if "width" not in map(ast.unparse, call.args)] == []
