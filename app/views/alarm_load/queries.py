@@ -15,17 +15,24 @@ from sqlalchemy.orm import Session
 from app.core.alarm_load import DAYS, STALE, TOP, Annunciation, Load, Noise, load, noisiest
 from app.core.decision.limits import nanometres
 from app.core.period import Period
-from app.errors import Invalid
+from app.errors import Invalid, TooManyRequests
 from app.language.i18n import _
+from app.loop.characteristics.queries import characteristic_named
 from app.loop.machines.queries import machine_named, machines
+from app.loop.summaries import queries as statistics
 from app.loop.tables.alarms import Alarm
 from app.loop.tables.characteristics import Characteristic
 from app.loop.tables.machines import Machine
+from app.quality.what_if import queries as what_if
 
 MOST_ALARMS = 100_000
 MOST_DAYS = 400
 WIDER = 1.25
 """Factor of a wear limit that is tried as the quieter one."""
+SOONER, REPLAYED = 0.5, 1000
+"""Factor of the zero range R33 with which that many readings are replayed: the loop corrects sooner."""
+PATIENCE = 1.0
+"""Seconds that the page waits for its turn among the replays; else this one is not computed."""
 LONGER = 3.0
 """Factor of the silence after which a bridge counts as silent, tried likewise."""
 
@@ -58,7 +65,10 @@ class Position(NamedTuple):
 
 
 class Quieter(NamedTuple):
-    """The effect of a quieter setting: how many of the alarms would have been raised all the same."""
+    """The effect of a quieter setting: how many of the alarms would have been raised all the same.
+
+    Of over- and undersize it is about the parts of the last `REPLAYED` readings that are out of tolerance, replayed.
+    """
 
     alarms: int
     left: int
@@ -200,6 +210,7 @@ def _top(
         for row in of_cause
     ]
     found: list[Loud] = []
+    replays: dict[int, Quieter | None] = {}
     for noise in noisiest(alarms, TOP):
         cause = noise.cause
         assert isinstance(cause, Cause)
@@ -207,7 +218,12 @@ def _top(
         characteristic = None
         if cause.characteristic_id is not None:
             characteristic = session.get(Characteristic, (cause.machine_id, cause.characteristic_id))
-        quieter = _quieter(session, cause, of_cause, now, silent_after)
+        if cause.kind in {"oversize", "undersize"} and characteristic is not None:
+            if characteristic.id not in replays:
+                replays[characteristic.id] = _corrected_sooner(session, characteristic.key)
+            quieter = replays[characteristic.id]
+        else:
+            quieter = _quieter(session, cause, of_cause, now, silent_after)
         rule = next((row.rule for row in of_cause if row.rule), None)
         found.append(Loud(noise, cause, known[cause.machine_id], characteristic, rule, quieter))
     return found
@@ -231,3 +247,19 @@ def _quieter(session: Session, cause: Cause, rows: Sequence[Any], now: datetime,
         left = sum(nanometres(row.most) >= nanometres(WIDER * row.wear_limit) for row in read)
         return Quieter(len(read), left, WIDER) if read else None
     return None
+
+
+def _corrected_sooner(session: Session, key: str) -> Quieter | None:
+    """Parts out of tolerance with today's settings and with a smaller R33, both replayed as *What if* does; None where it cannot."""
+    current = characteristic_named(session, key)
+    parameters = current.parameters
+    if not parameters.tool_memory or parameters.measures_only or parameters.zero_range <= 0:
+        return None
+    settings = what_if.Settings(zero_range=round(SOONER * parameters.zero_range, 6))
+    try:
+        with what_if.turn(PATIENCE):
+            window = statistics.window_of(session, current.characteristic, last=REPLAYED)
+            both = what_if.side_by_side(session, what_if.load(session, current, window), settings)
+    except (Invalid, TooManyRequests):
+        return None
+    return Quieter(both.today.rejects, both.other.rejects, SOONER)

@@ -63,7 +63,8 @@ class LoudAlarmOut(BaseModel):
     made_by: Annotated[str, Field(description="Rule or parameter by which it is raised, in words.")]
     quieter: Annotated[str, Field(description="What a quieter setting would have done, in words.")]
     quieter_left: Annotated[
-        int | None, Field(description="Alarms that it would have left; null: not computed for this kind.")
+        int | None,
+        Field(description="Alarms that it would have left (of over- and undersize: parts); null: not computed."),
     ]
 
     @classmethod

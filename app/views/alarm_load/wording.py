@@ -2,7 +2,7 @@
 
 from app.core.alarm_load import LoadVerdict
 from app.language.i18n import _
-from app.views.alarm_load.queries import Loud
+from app.views.alarm_load.queries import REPLAYED, Loud
 
 
 def verdict_word(verdict: LoadVerdict) -> str:
@@ -49,6 +49,9 @@ def quieter_words(loud: Loud) -> str:
         if kind in {"oversize", "undersize", "hunting"} and loud.characteristic is not None:
             return _("not computed here: What if replays other R33, R34 and k")
         return _("not computed")
+    if kind in {"oversize", "undersize"}:
+        text = _("R33 halved: {left} parts out in place of {n}, in a replay of the last {readings} readings")
+        return text.format(left=found.left, n=found.alarms, readings=REPLAYED)
     left = _("{left} of {n} alarms left").format(left=found.left, n=found.alarms)
     match kind:
         case "signal":

@@ -6,6 +6,7 @@ import pytest
 from sqlalchemy import text
 
 from tests.conftest import Server
+from tests.quality.closed_loop import cut, scatter
 from tests.shop import Person, Shop
 
 BEGIN = datetime(2026, 2, 3, 6, tzinfo=UTC)
@@ -87,3 +88,15 @@ def test_its_page_shows_the_same_and_what_it_rests_on(ran: Shop, server: Server)
         assert words in page
     assert "No alarm in this period" in viewer.open(f"/alarms/load?machine={ran.machine}&from=2020-01-01&to=2020-01-02")
     ran.call("GET", "/alarm-load?from=2020-01-01&to=2026-01-01", 422)
+
+
+def test_a_loop_that_corrects_sooner_is_replayed(shop: Shop) -> None:
+    """The same replay as on the page of What if."""
+    cut(shop, [*scatter(120, wear=0.1), 26.0, *scatter(20, seed=2, begin=12.0)])
+    found = shop.call("GET", f"/alarm-load?machine={shop.machine}")
+    (large,) = [each for each in found["top"] if each["kind"] == "oversize"]
+    replay = shop.call("POST", f"/characteristics/{shop.characteristic}/what-if", zero_range=0.0005, last=1000)
+    assert large["quieter_left"] == replay["other"]["rejects"]
+    assert large["quieter"].startswith(
+        f"R33 halved: {replay['other']['rejects']} parts out in place of {replay['today']['rejects']}"
+    )
