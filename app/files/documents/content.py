@@ -4,7 +4,7 @@ A report is a head and sections; a section holds sentences, facts, a table, and 
 same sections, so that page, PDF, XLSX, CSV and JSON cannot say different things.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from enum import StrEnum
@@ -194,6 +194,15 @@ class Table:
     def filled(self) -> list[int]:
         """The columns in which anything stands: on paper there is no room for the others."""
         return [at for at in range(len(self.columns)) if any(row[at].value not in (None, "") for row in self.rows)]
+
+
+def table_of(rows: Iterable[Any], *columns: tuple[Column, Callable[[Any], Value]], more: int = 0) -> Table:
+    """A table of these rows: each column with its value of a row."""
+    return Table(
+        tuple(column for column, _value in columns),
+        tuple(tuple(value(row) for _column, value in columns) for row in rows),
+        more,
+    )
 
 
 @dataclass(frozen=True, slots=True)

@@ -17,6 +17,7 @@ from app.files.documents.content import (
     deviation,
     moment,
     size,
+    table_of,
     width,
     words,
 )
@@ -29,48 +30,31 @@ from app.loop.quarantine import wording
 from app.loop.quarantine.queries import PartRow, QuarantineRow
 
 
-def table_of(rows: list[PartRow]) -> Table:
+def parts_table(rows: list[PartRow]) -> Table:
     """The parts, a row each."""
-    return Table(
+    return table_of(
+        rows,
+        (Column("number", _("No."), 0.5, "right"), lambda row: count(row.part.number)),
         (
-            Column("number", _("No."), 0.5, "right"),
             Column("part", _("Part"), 1.4),
-            Column("order", _("Order"), 1.0),
-            Column("characteristic", _("Characteristic"), 1.4),
-            Column("reading", _("Reading"), 0.8, "right"),
-            Column("cut_at", _("Cut or measured"), 1.4),
-            Column("tool", _("Tool"), 0.5, "right"),
-            Column("offset", _("Cut with offset"), 1.1, "right"),
-            Column("cut_without", _("Cut without correction"), 1.0),
-            Column("measured", _("Size"), 1.1, "right"),
-            Column("deviation", _("Deviation"), 0.9, "right"),
-            Column("found", _("Measured?"), 1.2),
-            Column("status", _("Status"), 0.9),
-            Column("remeasured", _("Measured again"), 1.1, "right"),
-            Column("decided", _("By whom, when, why"), 2.2),
+            lambda row: words(wording.part_name(row.part.part, row.part.part_to) if row.part.part else None),
         ),
-        tuple(_row(row) for row in rows),
-    )
-
-
-def _row(row: PartRow) -> tuple[Value, ...]:
-    part = row.part
-    return (
-        count(part.number),
-        words(wording.part_name(part.part, part.part_to) if part.part else None),
-        words(part.order),
-        words(row.characteristic.key),
-        count(part.sequence),
-        moment(part.cut_at),
-        count(part.tool_memory),
-        size(part.offset),
-        words(", ".join(map(str, part.cut_without))),
-        size(part.measured),
-        deviation(part.deviation),
-        words(wording.found_word(part.found)),
-        words(wording.status_word(part.status)),
-        size(part.remeasured),
-        words(wording.decided(part)),
+        (Column("order", _("Order"), 1.0), lambda row: words(row.part.order)),
+        (Column("characteristic", _("Characteristic"), 1.4), lambda row: words(row.characteristic.key)),
+        (Column("reading", _("Reading"), 0.8, "right"), lambda row: count(row.part.sequence)),
+        (Column("cut_at", _("Cut or measured"), 1.4), lambda row: moment(row.part.cut_at)),
+        (Column("tool", _("Tool"), 0.5, "right"), lambda row: count(row.part.tool_memory)),
+        (Column("offset", _("Cut with offset"), 1.1, "right"), lambda row: size(row.part.offset)),
+        (
+            Column("cut_without", _("Cut without correction"), 1.0),
+            lambda row: words(", ".join(map(str, row.part.cut_without))),
+        ),
+        (Column("measured", _("Size"), 1.1, "right"), lambda row: size(row.part.measured)),
+        (Column("deviation", _("Deviation"), 0.9, "right"), lambda row: deviation(row.part.deviation)),
+        (Column("found", _("Measured?"), 1.2), lambda row: words(wording.found_word(row.part.found))),
+        (Column("status", _("Status"), 0.9), lambda row: words(wording.status_word(row.part.status))),
+        (Column("remeasured", _("Measured again"), 1.1, "right"), lambda row: size(row.part.remeasured)),
+        (Column("decided", _("By whom, when, why"), 2.2), lambda row: words(wording.decided(row.part))),
     )
 
 
@@ -98,13 +82,13 @@ def report_of(row: QuarantineRow, rows: list[PartRow], now: datetime) -> Report:
         zone=plant_zone().key,
         made_at=moment(now),
         head=head,
-        sections=(Section("parts", _("Parts"), table=table_of(rows)),),
+        sections=(Section("parts", _("Parts"), table=parts_table(rows)),),
     )
 
 
 def file_of_quarantine(row: QuarantineRow, rows: list[PartRow], as_: Format, now: datetime) -> bytes:
     """The file. CSV has a line a part, under the names of the columns."""
-    return _csv(table_of(rows)) if as_ is Format.CSV else file_of(report_of(row, rows, now), as_)
+    return _csv(parts_table(rows)) if as_ is Format.CSV else file_of(report_of(row, rows, now), as_)
 
 
 def _csv(table: Table) -> bytes:

@@ -5,7 +5,19 @@ from functools import partial
 from sqlalchemy import func, select
 
 from app.db.period import in_period
-from app.files.documents.content import Column, Fact, Picture, Section, Table, count, deviation, moment, size, words
+from app.files.documents.content import (
+    Column,
+    Fact,
+    Picture,
+    Section,
+    Table,
+    count,
+    deviation,
+    moment,
+    size,
+    table_of,
+    words,
+)
 from app.language.i18n import _
 from app.loop.tables.tools import Correction, ToolEvent
 from app.loop.timeline import queries as timeline
@@ -39,34 +51,18 @@ def corrections(frame: Frame) -> Section:
         for status, number in sorted(counted.items())
     ]
     facts.append(Fact("sum_applied", _("Sum of those applied"), deviation(total or 0.0)))
-    table = Table(
-        (
-            Column("number", _("Number"), 0.9, "right"),
-            Column("reading", _("Reading"), 0.8, "right"),
-            Column("issued_at", _("Issued at"), 1.7),
-            Column("tool", _("Tool"), 0.5, "right"),
-            Column("amount", _("Amount"), 1.0, "right"),
-            Column("status", _("Status"), 1.0),
-            Column("applied_at", _("Applied at"), 1.7),
-            Column("offset_after", _("Offset after"), 1.1, "right"),
-            Column("by", _("By whom"), 2.0),
-            Column("why", _("Why"), 2.0),
-        ),
-        tuple(
-            (
-                count(row.number),
-                count(row.sequence),
-                moment(row.created_at),
-                count(row.tool_memory),
-                deviation(row.amount),
-                words(tool_wording.status_word(row.status)),
-                moment(row.applied_at),
-                size(row.offset_after),
-                words(row.applied_by or row.decided_by),
-                words(tool_wording.why(row)),
-            )
-            for row in rows
-        ),
+    table = table_of(
+        rows,
+        (Column("number", _("Number"), 0.9, "right"), lambda row: count(row.number)),
+        (Column("reading", _("Reading"), 0.8, "right"), lambda row: count(row.sequence)),
+        (Column("issued_at", _("Issued at"), 1.7), lambda row: moment(row.created_at)),
+        (Column("tool", _("Tool"), 0.5, "right"), lambda row: count(row.tool_memory)),
+        (Column("amount", _("Amount"), 1.0, "right"), lambda row: deviation(row.amount)),
+        (Column("status", _("Status"), 1.0), lambda row: words(tool_wording.status_word(row.status))),
+        (Column("applied_at", _("Applied at"), 1.7), lambda row: moment(row.applied_at)),
+        (Column("offset_after", _("Offset after"), 1.1, "right"), lambda row: size(row.offset_after)),
+        (Column("by", _("By whom"), 2.0), lambda row: words(row.applied_by or row.decided_by)),
+        (Column("why", _("Why"), 2.0), lambda row: words(tool_wording.why(row))),
         more=sum(counted.values()) - len(rows),
     )
     return Section("corrections", _("Corrections"), facts=tuple(facts), table=table if rows else None)
@@ -88,32 +84,17 @@ def tools(frame: Frame) -> Section | None:
         .order_by(ToolEvent.id.desc())
         .limit(MOST_ROWS + 1)
     ).all()
-    table = Table(
-        (
-            Column("at", _("At"), 1.7),
-            Column("tool", _("Tool"), 0.5, "right"),
-            Column("what", _("What"), 1.2),
-            Column("offset_before", _("Offset before"), 1.1, "right"),
-            Column("offset_after", _("Offset after"), 1.1, "right"),
-            Column("parts", _("Parts cut"), 0.9, "right"),
-            Column("total", _("Sum of its corrections"), 1.2, "right"),
-            Column("by", _("By whom"), 2.0),
-            Column("why", _("Why"), 2.0),
-        ),
-        tuple(
-            (
-                moment(row.at),
-                count(row.number),
-                words(tool_wording.event_word(row.kind)),
-                size(row.offset_before),
-                size(row.offset_after),
-                count(row.parts),
-                deviation(row.total),
-                words(row.actor),
-                words(row.reason),
-            )
-            for row in rows[:MOST_ROWS]
-        ),
+    table = table_of(
+        rows[:MOST_ROWS],
+        (Column("at", _("At"), 1.7), lambda row: moment(row.at)),
+        (Column("tool", _("Tool"), 0.5, "right"), lambda row: count(row.number)),
+        (Column("what", _("What"), 1.2), lambda row: words(tool_wording.event_word(row.kind))),
+        (Column("offset_before", _("Offset before"), 1.1, "right"), lambda row: size(row.offset_before)),
+        (Column("offset_after", _("Offset after"), 1.1, "right"), lambda row: size(row.offset_after)),
+        (Column("parts", _("Parts cut"), 0.9, "right"), lambda row: count(row.parts)),
+        (Column("total", _("Sum of its corrections"), 1.2, "right"), lambda row: deviation(row.total)),
+        (Column("by", _("By whom"), 2.0), lambda row: words(row.actor)),
+        (Column("why", _("Why"), 2.0), lambda row: words(row.reason)),
         more=max(0, len(rows) - MOST_ROWS),
     )
     sentences = () if rows else (_("No tool was changed and no offset was edited by hand."),)

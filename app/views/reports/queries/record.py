@@ -4,7 +4,7 @@ from sqlalchemy import func, or_, select
 
 from app.core.parameters import BY_NAME
 from app.db.period import in_period
-from app.files.documents.content import Column, Fact, Section, Table, count, deviation, moment, size, words
+from app.files.documents.content import Column, Fact, Section, Table, count, deviation, moment, size, table_of, words
 from app.language.i18n import _
 from app.loop.alarm_response import wording as alarm_wording
 from app.loop.characteristics import wording
@@ -39,34 +39,21 @@ def alarms(frame: Frame) -> Section:
         select(func.count()).select_from(Alarm).where(*here, Alarm.acknowledged_at.is_(None))
     )
     rows = frame.session.scalars(select(Alarm).where(*here).order_by(Alarm.id.desc()).limit(MOST_ROWS)).all()
-    table = Table(
+    table = table_of(
+        rows,
+        (Column("number", _("Number"), 0.9, "right"), lambda row: count(row.id)),
+        (Column("raised_at", _("Raised at"), 1.6), lambda row: moment(row.raised_at)),
+        (Column("kind", _("Kind"), 1.1), lambda row: words(alarm_wording.kind_word(row.kind))),
+        (Column("reading", _("Reading"), 0.8, "right"), lambda row: count(row.sequence)),
+        (Column("times", _("Times"), 0.5, "right"), lambda row: count(row.count)),
+        (Column("what", _("What was wrong"), 2.8), lambda row: words(alarm_wording.sentence(row))),
+        (Column("acknowledged_at", _("Acknowledged at"), 1.6), lambda row: moment(row.acknowledged_at)),
+        (Column("by", _("By whom"), 1.0), lambda row: words(row.acknowledged_by)),
         (
-            Column("number", _("Number"), 0.9, "right"),
-            Column("raised_at", _("Raised at"), 1.6),
-            Column("kind", _("Kind"), 1.1),
-            Column("reading", _("Reading"), 0.8, "right"),
-            Column("times", _("Times"), 0.5, "right"),
-            Column("what", _("What was wrong"), 2.8),
-            Column("acknowledged_at", _("Acknowledged at"), 1.6),
-            Column("by", _("By whom"), 1.0),
             Column("action", _("What was done"), 1.1),
-            Column("comment", _("Comment"), 1.5),
+            lambda row: words(alarm_wording.action_word(row.action) if row.action else ""),
         ),
-        tuple(
-            (
-                count(row.id),
-                moment(row.raised_at),
-                words(alarm_wording.kind_word(row.kind)),
-                count(row.sequence),
-                count(row.count),
-                words(alarm_wording.sentence(row)),
-                moment(row.acknowledged_at),
-                words(row.acknowledged_by),
-                words(alarm_wording.action_word(row.action) if row.action else ""),
-                words(row.comment),
-            )
-            for row in rows
-        ),
+        (Column("comment", _("Comment"), 1.5), lambda row: words(row.comment)),
         more=total - len(rows),
     )
     facts = (
@@ -103,14 +90,12 @@ def notes(frame: Frame) -> Section | None:
     if not rows:
         return None
     total = frame.session.scalar(select(func.count()).select_from(Note).where(*chosen)) or 0
-    table = Table(
-        (
-            Column("at", _("At"), 1.4),
-            Column("reading", _("Reading"), 0.8, "right"),
-            Column("note", _("Note"), 5.0),
-            Column("by", _("By whom"), 1.2),
-        ),
-        tuple((moment(row.at), count(row.sequence), words(row.text), words(row.written_by)) for row in rows),
+    table = table_of(
+        rows,
+        (Column("at", _("At"), 1.4), lambda row: moment(row.at)),
+        (Column("reading", _("Reading"), 0.8, "right"), lambda row: count(row.sequence)),
+        (Column("note", _("Note"), 5.0), lambda row: words(row.text)),
+        (Column("by", _("By whom"), 1.2), lambda row: words(row.written_by)),
         more=total - len(rows),
     )
     return Section("notes", _("Notes"), table=table)
@@ -130,32 +115,20 @@ def quarantined(frame: Frame) -> Section | None:
     rows = frame.session.scalars(select(QuarantinedPart).where(*inside).order_by(*newest).limit(MOST_ROWS)).all()
     if not rows:
         return None
-    table = Table(
+    table = table_of(
+        rows,
+        (Column("quarantine", _("Quarantine"), 0.8, "right"), lambda row: count(row.quarantine_id)),
         (
-            Column("quarantine", _("Quarantine"), 0.8, "right"),
             Column("part", _("Part"), 1.4),
-            Column("order", _("Order"), 1.0),
-            Column("reading", _("Reading"), 0.7, "right"),
-            Column("deviation", _("Deviation"), 0.9, "right"),
-            Column("offset", _("Cut with offset"), 1.1, "right"),
-            Column("status", _("Status"), 0.9),
-            Column("remeasured", _("Measured again"), 1.1, "right"),
-            Column("decided", _("By whom, when, why"), 2.4),
+            lambda row: words(quarantine_wording.part_name(row.part, row.part_to) if row.part else None),
         ),
-        tuple(
-            (
-                count(row.quarantine_id),
-                words(quarantine_wording.part_name(row.part, row.part_to) if row.part else None),
-                words(row.order),
-                count(row.sequence),
-                deviation(row.deviation),
-                size(row.offset),
-                words(quarantine_wording.status_word(row.status)),
-                size(row.remeasured),
-                words(quarantine_wording.decided(row)),
-            )
-            for row in rows
-        ),
+        (Column("order", _("Order"), 1.0), lambda row: words(row.order)),
+        (Column("reading", _("Reading"), 0.7, "right"), lambda row: count(row.sequence)),
+        (Column("deviation", _("Deviation"), 0.9, "right"), lambda row: deviation(row.deviation)),
+        (Column("offset", _("Cut with offset"), 1.1, "right"), lambda row: size(row.offset)),
+        (Column("status", _("Status"), 0.9), lambda row: words(quarantine_wording.status_word(row.status))),
+        (Column("remeasured", _("Measured again"), 1.1, "right"), lambda row: size(row.remeasured)),
+        (Column("decided", _("By whom, when, why"), 2.4), lambda row: words(quarantine_wording.decided(row))),
         more=total - len(rows),
     )
     return Section("quarantine", _("Parts set aside"), table=table)
@@ -234,19 +207,14 @@ def excluded(frame: Frame) -> Section | None:
     rows = frame.session.execute(query.order_by(Exclusion.sequence.desc()).limit(MOST_ROWS)).all()
     if not rows:
         return None
-    table = Table(
-        (
-            Column("reading", _("Reading"), 0.7, "right"),
-            Column("measured_at", _("Measured at"), 1.5),
-            Column("deviation", _("Deviation"), 0.9, "right"),
-            Column("at", _("Excluded at"), 1.5),
-            Column("by", _("By whom"), 1.0),
-            Column("why", _("Why"), 2.5),
-        ),
-        tuple(
-            (count(sequence), moment(measured_at), deviation(value), moment(at), words(actor), words(reason))
-            for sequence, measured_at, value, at, actor, reason in rows
-        ),
+    table = table_of(
+        rows,
+        (Column("reading", _("Reading"), 0.7, "right"), lambda row: count(row.sequence)),
+        (Column("measured_at", _("Measured at"), 1.5), lambda row: moment(row.measured_at)),
+        (Column("deviation", _("Deviation"), 0.9, "right"), lambda row: deviation(row.deviation)),
+        (Column("at", _("Excluded at"), 1.5), lambda row: moment(row.at)),
+        (Column("by", _("By whom"), 1.0), lambda row: words(row.actor)),
+        (Column("why", _("Why"), 2.5), lambda row: words(row.reason)),
         more=frame.numbers.excluded - len(rows),
     )
     sentence = _("Excluded from all numbers above; they stay on record.")
@@ -264,34 +232,24 @@ def decisions(frame: Frame) -> Section | None:
         Reading.sequence >= frame.window.first, frame.window.in_time,
     )  # fmt: skip
     answers = readings.answers(frame.session, entry, records)
-    table = Table(
+    table = table_of(
+        answers,
+        (Column("reading", _("Reading"), 0.8, "right"), lambda answer: count(answer["sequence"])),
+        (Column("measured_at", _("Measured at"), 1.2), lambda answer: moment(answer["measured_at"])),
+        (Column("part", _("Part"), 1.3), lambda answer: words(answer["part"])),
+        (Column("size", _("Size"), 1.2, "right"), lambda answer: size(answer["size"])),
+        (Column("measured", _("Machine reading"), 1.2, "right"), lambda answer: size(answer["measured"])),
+        (Column("deviation", _("Deviation"), 0.8, "right"), lambda answer: deviation(answer["deviation"])),
+        (Column("zone", _("Zone"), 0.8), lambda answer: words(zone_name(answer["zone"]))),
         (
-            Column("reading", _("Reading"), 0.8, "right"),
-            Column("measured_at", _("Measured at"), 1.2),
-            Column("part", _("Part"), 1.3),
-            Column("size", _("Size"), 1.2, "right"),
-            Column("measured", _("Machine reading"), 1.2, "right"),
-            Column("deviation", _("Deviation"), 0.8, "right"),
-            Column("zone", _("Zone"), 0.8),
             Column("correction", _("Correction"), 0.9, "right"),
+            lambda answer: deviation(answer["correction"]["amount"] if answer["correction"] else None),
+        ),
+        (
             Column("status", _("Issued as"), 0.9),
-            Column("reason", _("Reason"), 4.8),
+            lambda answer: words(status_word(answer["correction"]["status"]) if answer["correction"] else ""),
         ),
-        tuple(
-            (
-                count(answer["sequence"]),
-                moment(answer["measured_at"]),
-                words(answer["part"]),
-                size(answer["size"]),
-                size(answer["measured"]),
-                deviation(answer["deviation"]),
-                words(zone_name(answer["zone"])),
-                deviation(answer["correction"]["amount"] if answer["correction"] else None),
-                words(status_word(answer["correction"]["status"]) if answer["correction"] else ""),
-                words(answer["reason"]["text"]),
-            )
-            for answer in answers
-        ),
+        (Column("reason", _("Reason"), 4.8), lambda answer: words(answer["reason"]["text"])),
         more=frame.numbers.count + frame.numbers.excluded - len(records),
     )
     sentence = _("Newest first; the export of readings holds all of them.")
