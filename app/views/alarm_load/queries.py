@@ -25,7 +25,7 @@ from app.loop.tables.characteristics import Characteristic
 from app.loop.tables.machines import Machine
 from app.quality.what_if import queries as what_if
 
-MOST_ALARMS = 100_000
+MOST_ALARMS = MOST_MACHINES = 100_000
 MOST_DAYS = 400
 WIDER = 1.25
 """Factor of a wear limit that is tried as the quieter one."""
@@ -141,7 +141,7 @@ def alarm_load(
     if cut:
         rows = rows[:MOST_ALARMS]
         start = rows[-1].raised_at
-    known = {each.id: each for each in ([chosen] if chosen else machines(session))}
+    known = {each.id: each for each in ([chosen] if chosen else machines(session, limit=MOST_MACHINES))}
     stale = _stale(session, now, chosen)
     by_machine: dict[int, list[datetime]] = defaultdict(list)
     for row in rows:

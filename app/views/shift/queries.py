@@ -31,6 +31,7 @@ OWN = "inband"
 """By whom an alarm is acknowledged that ended by itself."""
 MOST_ALARMS = 1000
 MOST_NEXT = 50
+MOST_MACHINES = 100_000
 EARLIEST_YEAR = 1900
 
 # A part counts once, by the last reading of each of its characteristics: one that was cut again and measured good is good.
@@ -228,7 +229,7 @@ def shift(session: Session, at: datetime, now: datetime, machine: str | None = N
     changes: dict[int, int] = {row.machine_id: row.changes for row in session.execute(text(_CHANGES), where)}
     of_machines = [
         OfMachine(each, made.get(each.id, Made()), answered.get(each.id, Answered()), changes.get(each.id, 0))
-        for each in ([chosen] if chosen else machines(session))
+        for each in ([chosen] if chosen else machines(session, limit=MOST_MACHINES))
     ]
     return Shift(
         period,
