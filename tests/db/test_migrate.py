@@ -45,6 +45,7 @@ ADDED: dict[str, dict[str, Any]] = {
         "plausible_shift": 10,
         "plausible_axis_turn": 1,
         "plausible_axis_shift": 1,
+        "simulated": False,
     },
     "audit_entry": {"person_id": None, "key_id": None, "device_id": None},
     "person": {"pin_hash": None},
