@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 from datetime import datetime
 from typing import Any, NamedTuple
 
-from sqlalchemy import func, select
+from sqlalchemy import ColumnElement, func, select
 from sqlalchemy.orm import Session
 
 from app.core.period import ALWAYS, Period
@@ -79,8 +79,9 @@ def causes_of_alarms(
     characteristic_id: int | None = None,
     kind: str | None = None,
     period: Period = ALWAYS,
+    which: Sequence[ColumnElement[bool]] = (),
 ) -> Pareto:
-    """Acknowledged alarms that were raised in the period, the newest `MOST_ALARMS` of them, by cause.
+    """Acknowledged alarms that were raised in the period, the newest `MOST_ALARMS` of them, by cause. which: conditions besides.
 
     One that a person has not acknowledged, because it ended by itself, has no cause and is not counted.
     """
@@ -97,7 +98,10 @@ def causes_of_alarms(
         .scalar_subquery()
     )
     query = select(Alarm.cause, Alarm.raised_at, Alarm.acknowledged_at, recovered).where(
-        Alarm.acknowledged_at.is_not(None), Alarm.acknowledged_by != ENDED_BY_ITSELF, in_period(Alarm.raised_at, period)
+        Alarm.acknowledged_at.is_not(None),
+        Alarm.acknowledged_by != ENDED_BY_ITSELF,
+        in_period(Alarm.raised_at, period),
+        *which,
     )
     if machine_id is not None:
         query = query.where(Alarm.machine_id == machine_id)

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from datetime import UTC, datetime
 from random import Random
 
-from app.simulators.demo import andon, calibrating, plant, touching, turning
+from app.simulators.demo import andon, calibrating, plant, reacting, touching, turning
 from app.simulators.demo.running import Line, Pace
 from app.simulators.demo.simulation import Machine
 from inband_client import Client, NotFound
@@ -65,6 +65,7 @@ def lines(
     operator = client(new_key(admin, "/keys", {"name": f"{KEY_NAME}: operator", "role": "operator"}))
     run = datetime.now(UTC).strftime("%y%m%d%H%M%S")
     simulated: list[Line] = []
+    causes = reacting.set_up(admin)
     for spec in machines:
         set_up(admin, spec)
         calibrating.behind(admin, spec.key, seed)
@@ -72,7 +73,7 @@ def lines(
         touching.behind(admin, spec.key, seed)
         gateway = client(new_key(admin, f"/machines/{spec.key}/keys", {"name": KEY_NAME}))
         rng = Random(f"{seed}:{spec.key}:operator")
-        simulated.append(Line(Machine(spec, seed), gateway, operator, run, rng, ending))
+        simulated.append(Line(Machine(spec, seed), gateway, operator, run, rng, ending, causes))
     andon.start(admin)
     admin.close()
     return simulated

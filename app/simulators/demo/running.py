@@ -7,7 +7,7 @@ pace; from there on the plant runs `speed` times as fast as it says, so its time
 import logging
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from copy import deepcopy
 from dataclasses import dataclass
 from datetime import UTC, datetime, timedelta
@@ -23,6 +23,7 @@ STOPS = {"tool_worn", "probe_fault", "offset_limit"}
 LARGEST_LAG = 30.0  # s of the wall clock: what was missed beyond it is not made up for
 SETS_ASIDE = {"oversize", "undersize", "tool_worn"}  # the first of them shows a quarantine
 LOOKS_EVERY, IN_A_ROW = 10, 3  # parts between two looks at the board; parts not accepted that ask for a hand
+NO_CAUSES: Mapping[str, int] = {}
 PATIENCE = (60.0, 90.0)  # s of the wall clock until the simulated operator steps in
 
 
@@ -52,7 +53,14 @@ class Line:
     """A machine with its gateway to the server, and the operator who looks after it."""
 
     def __init__(
-        self, machine: Machine, gateway: Client, operator: Client, run: str, rng: Random, ending: threading.Event
+        self,
+        machine: Machine,
+        gateway: Client,
+        operator: Client,
+        run: str,
+        rng: Random,
+        ending: threading.Event,
+        causes: Mapping[str, int] = NO_CAUSES,
     ) -> None:
         self.machine = machine
         self.key = machine.spec.key
@@ -61,6 +69,7 @@ class Line:
         self._run = run
         self._rng = rng
         self._ending = ending
+        self._causes = causes  # numbers of the catalogue by kind of alarm
         self._changed_at: dict[int, str | None] = {}
         self._fault_told = False  # the machine was ordered to stop because of what its dirty stylus measured
         self._set_aside = False
@@ -272,7 +281,9 @@ class Line:
         return list(self._operator.items("/alarms", state="active", machine=self.key))
 
     def _acknowledge(self, alarm: dict[str, Any], action: str, comment: str) -> None:
-        body = {"action": action, "comment": f"{comment} (simulated operator)"}
+        body: dict[str, Any] = {"action": action, "comment": f"{comment} (simulated operator)"}
+        if alarm["kind"] in self._causes:
+            body["cause"] = self._causes[alarm["kind"]]
         reason = "Until they are measured by hand (simulated operator)"
         try:
             if alarm["kind"] in SETS_ASIDE and not self._set_aside:

@@ -34,6 +34,7 @@ class SectionName(StrEnum):
     WEAR = "wear"
     CORRECTIONS = "corrections"
     ALARMS = "alarms"
+    CAUSES = "causes"
     QUARANTINE = "quarantine"
     NOTES = "notes"
     TOOLS = "tools"

@@ -130,6 +130,8 @@ def test_causes_are_counted_with_their_times(shop: Shop) -> None:
     (share,) = shop.call("GET", path)["causes"]
     assert share["recovering"] == 1
     assert share["recovered"] >= share["acknowledged"]
+    report = shop.admin.get(f"/api/v1/characteristics/{shop.characteristic}/report.json?section=causes").json()
+    assert name in str(report), report
     text = Person(shop.server, "viewer").open(f"/alarms/causes?machine={shop.machine}")
     assert name in text
 

@@ -12,6 +12,8 @@ from app.loop.control_plan import queries as control_plan
 from app.loop.notes.queries import on_charts_of
 from app.loop.quarantine import wording as quarantine_wording
 from app.loop.quarantine.tables import QuarantinedPart
+from app.loop.reactions import queries as reactions
+from app.loop.reactions import wording as reaction_wording
 from app.loop.readings import queries as readings
 from app.loop.tables.alarms import Alarm
 from app.loop.tables.notes import Note
@@ -73,6 +75,41 @@ def _missed(frame: Frame) -> list[Fact]:
     if parts:
         facts.append(Fact("parts_not_measured", _("Parts cut without them, at least"), count(parts)))
     return facts
+
+
+def causes(frame: Frame) -> Section | None:
+    """Causes of acknowledged alarms of the readings of the period; nothing where there are none."""
+    found = reactions.causes_of_alarms(
+        frame.session,
+        machine_id=frame.current.machine.id,
+        characteristic_id=frame.current.characteristic.id,
+        which=[frame.holds(Alarm.sequence)],
+    )
+    if not found.shares:
+        return None
+    table = Table(
+        (
+            Column("cause", _("Cause"), 3.0),
+            Column("alarms", _("Alarms"), 0.8, "right"),
+            Column("share", _("Share"), 0.8, "right"),
+            Column("sum", _("Sum"), 0.8, "right"),
+            Column("acknowledged", _("Time to acknowledge"), 1.4, "right"),
+            Column("recovered", _("Time to recover"), 1.4, "right"),
+        ),
+        tuple(
+            (
+                words(_("no cause given") if each.cause is None else found.names[each.cause]),
+                count(each.alarms),
+                words(f"{each.share:.0%}"),
+                words(f"{each.sum:.0%}"),
+                words(reaction_wording.duration(each.acknowledged)),
+                words(reaction_wording.duration(each.recovered)),
+            )
+            for each in found.shares
+        ),
+    )
+    sentence = _("Acknowledged alarms by the cause that was chosen. Times are medians from when the alarm was raised.")
+    return Section("causes", _("Causes of alarms"), sentences=(sentence,), table=table)
 
 
 def notes(frame: Frame) -> Section | None:
