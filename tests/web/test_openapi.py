@@ -426,6 +426,8 @@ FORMS: dict[str, tuple[str, ...] | None] = {
     "/setup/people/{person}/password": ("change_person",),
     "/setup/people/{person}/{what}": ("change_person",),
     "/setup/programs": ("read_program",),
+    "/setup/screens": ("add_wall_screen",),
+    "/setup/screens/{screen}/revoke": ("revoke_wall_screen",),
     "/setup/stations": None,
     "/setup/stations/badges": None,
     "/setup/stations/badges/{person}/remove": None,
@@ -458,7 +460,11 @@ def test_a_page_asks_for_the_role_that_the_api_asks_for(app: FastAPI, made: Json
         same = FORMS[route.path]
         if same is None:
             continue
-        calls = [dependency.call for dependency in route.dependant.dependencies]
+        dependencies = route.dependant.dependencies
+        inner = [
+            each for dependency in dependencies for each in dependency.dependencies
+        ]  # of the kit: who acts on what
+        calls = [dependency.call for dependency in (*dependencies, *inner)]
         names = [getattr(call, "__name__", "") for call in calls]
         asked = {name.removeprefix("require_") for name in names if name.startswith("require_")}
         wanted = min((roles[name] for name in same), key=ROLES.index)
