@@ -8,11 +8,10 @@ _ANGLES = {"A", "PA"}  # axes in degrees, whatever the unit of the block is
 _BLOCK = re.compile(r"[ \t]*DIM[ \t]+(\S+?)[ \t]*=", re.IGNORECASE)
 _UNITS = re.compile(r"\bUNITS[ \t]*=[ \t]*(\w+)", re.IGNORECASE)
 _HEADING = re.compile(r"[ \t]*AX[ \t].*\bMEAS\b", re.IGNORECASE)
-_SERIAL = re.compile(r"[ \t]*SER(?:IAL)? NUMBER[ \t]*:[ \t]*(.*?)\s*", re.IGNORECASE)
+_SERIAL = re.compile(r"[ \t]*SER(?:IAL)? NUMBER[ \t]*:(.*)", re.IGNORECASE)
 _ROW = re.compile(r"[ \t]*([A-Z]{1,2}\d?)(?=[ \t]+(?:[+-]?[\d.]|MMC|LMC|RFS))")
 _WORDS = {"MMC", "LMC", "RFS"}  # in place of a nominal size
-_CELL = re.compile(r"(?<!\S)(?:[+-]?\d*[.,]?\d+|MMC|LMC|RFS)(?=\s|<|$)")
-_BOTH = re.compile(rf"^{_BLOCK.pattern}.*?^{_HEADING.pattern}", re.IGNORECASE | re.MULTILINE | re.DOTALL)
+_CELL = re.compile(r"(?<!\S)(?:[+-]?(?:\d++(?:[.,]\d++)?|[.,]\d++)|MMC|LMC|RFS)(?=\s|<|$)")
 
 
 def is_report(beginning: str) -> bool:
@@ -21,7 +20,8 @@ def is_report(beginning: str) -> bool:
     >>> is_report("DIM LOC1= LOCATION OF CIRCLE CIR1  UNITS=MM\\nAX  NOMINAL  MEAS\\nX  25.000  25.012\\n")
     True
     """
-    return _BOTH.search(beginning) is not None
+    lines = iter(beginning.splitlines())
+    return any(map(_BLOCK.match, lines)) and any(map(_HEADING.match, lines))  # first a block, then its heading
 
 
 def columns_of(lines: Iterable[str]) -> list[str]:
@@ -31,7 +31,7 @@ def columns_of(lines: Iterable[str]) -> list[str]:
     for line in lines:
         if _HEADING.match(line):
             found |= dict.fromkeys(line.split())
-        serial = serial or _SERIAL.fullmatch(line) is not None
+        serial = serial or _SERIAL.match(line) is not None
     return [FEATURE, *found, UNIT, *([SERIAL] if serial else [])]
 
 
@@ -44,8 +44,8 @@ def table(lines: Iterable[str], columns: Sequence[str]) -> Iterator[tuple[int, l
         line = tabbed.expandtabs()
         if block := _BLOCK.match(line):
             feature, unit, heading = block[1], "", []
-        if named := _SERIAL.fullmatch(line):
-            serial = named[1]
+        if named := _SERIAL.match(line):
+            serial = named[1].strip()
         elif _HEADING.match(line):
             heading = [(match[0], match.end()) for match in re.finditer(r"\S+", line)]
             if not begun:
