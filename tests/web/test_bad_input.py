@@ -109,7 +109,7 @@ BODIES: dict[str, dict[str, Any]] = {
         "shift_report": True,
     },
     "POST /api/v1/reactions/plans": REACTION | {"characteristic": "{characteristic}", "rule": "nelson_1"},
-    "PUT /api/v1/reactions/plans/{plan}": REACTION | {"kind": "hunting"},
+    "PUT /api/v1/reactions/plans/{plan}": REACTION | {"characteristic": "{characteristic}", "kind": "hunting"},
     "POST /api/v1/reactions/plans/{plan}/withdraw": WHY,
     "POST /api/v1/reactions/catalogue": {"sort": "cause", "name": "Chip on the stylus"},
     "PATCH /api/v1/reactions/catalogue/{entry}": {"retired": False},
@@ -566,8 +566,9 @@ class Place:
             "proposal": proposal["id"],
             "receiver": self.notified(shop),
             "route": 1,
-            "plan": shop.call("POST", "/reactions/plans", 201, **REACTION | {"kind": "hunting"})["id"],
-            "entry": shop.call("POST", "/reactions/catalogue", 201, sort="action", name="Insert turned")["id"],
+            "plan": shop.call("POST", "/reactions/plans", 201, **self.reaction(shop))["id"],
+            "entry": shop.call("POST", "/reactions/catalogue", 201, sort="action", name=shop.machine)["id"],
+            "screen": shop.call("POST", "/wall-screens", 201, name="Hall")["id"],
             "delivery": 1,
             "form": "csv",
             "person": next(person[name] for name in ("id", "name", "key") if name in person),
@@ -620,6 +621,11 @@ class Place:
         self.numbers |= {f"/api/v1/reports/{{number}}{what}": reports for what in of_reports}
         of_part = "/api/v1/quarantines/{quarantine}/parts/{number}/"
         self.numbers |= {of_part + what: 1 for what in ("measure", "release", "scrap")}
+
+    @staticmethod
+    def reaction(shop: Shop) -> dict[str, Any]:
+        """A plan of this place alone."""
+        return REACTION | {"characteristic": shop.characteristic, "kind": "hunting"}
 
     @staticmethod
     def notified(shop: Shop) -> Any:

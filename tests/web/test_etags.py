@@ -56,6 +56,16 @@ def _person(shop: Shop, n: int) -> Edit:
     return f"/people/{person['id']}", {"role": ("operator", "engineer")[n - 1]}
 
 
+def _reaction(shop: Shop, n: int) -> Edit:
+    of = {"characteristic": shop.characteristic, "kind": "hunting"}
+    body = BODIES["PUT /api/v1/reactions/plans/{plan}"] | of
+    if n == 1:
+        shop.call("POST", "/reactions/plans", 201, **body)
+    plans = shop.call("GET", "/reactions/plans?limit=1000")["items"]
+    plan = next(each for each in plans if each["characteristic"] == shop.characteristic)
+    return f"/reactions/plans/{plan['id']}", body | {"name": f"Hunting {n}"}
+
+
 def _route(shop: Shop, n: int) -> Edit:
     name = f"route-{shop.machine}"
     if n == 1:
@@ -102,6 +112,11 @@ EDITS: dict[str, Callable[[Shop, int], Edit]] = {
     "PUT /gauge-studies/{study}": _study,
     "PATCH /people/{person}": _person,
     "PUT /notifications/routes/{route}": _route,
+    "PUT /characteristics/{characteristic}/control-plan": lambda shop, n: (
+        f"/characteristics/{shop.characteristic}/control-plan",
+        {"every": 4 + n} | WHY,
+    ),
+    "PUT /reactions/plans/{plan}": _reaction,
 }
 
 

@@ -75,6 +75,11 @@ DATA: dict[str, list[dict[str, Any]]] = {
     "calibration_overdue": [{"days": 31, "location": 5}, {"parts": 500, "location": 5, "memory": "tool"}],
     "fixture_shifted": [{"location": "vice-2", "shifts": {"x": 0.12, "y": -0.3}, "limit": 0.1, "zero": 8}],
     "kinematics_drift": [{"name": "c-tilt-x", "location": "c", "value": 0.02, "limit": 0.01, "run": 7}],
+    "measurement_missed": [
+        {"by": "parts", "parts": 12, "every": 10, "minutes_planned": 60},
+        {"by": "minutes", "minutes": 75, "every": 10, "minutes_planned": 60},
+        {"by": "shift"},
+    ],
     "hunting": [],  # worded with the settings: by the tests of wear
     "signal": [],  # with the chart: by the tests of signals
     "calibration_refused": [],  # with the refusal: by the tests of calibration
