@@ -96,6 +96,9 @@ async def _load(
         snapshot.last_correction[machine_id], snapshot.versions[machine_id] = last, version
     for machine_id, number, applied_at, decided_at, fetched_at in loaded.named or ():
         snapshot.named[machine_id, number] = NamedCorrection(applied_at, decided_at, fetched_at)
+        if applied_at is not None:  # for readings of form, which are loaded after these: their tools go back as far
+            since = machines[machine_id]["since"]
+            machines[machine_id]["since"] = applied_at if since is None else min(since, applied_at)
     for stream, average, tool in loaded.streams:
         c = stream.entry.characteristic_id
         snapshot.parameters[c] = await _parameters(pipeline, book, stream.entry, stream.version)

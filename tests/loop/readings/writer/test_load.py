@@ -1,0 +1,31 @@
+"""Loading the state of readings: what the first load finds goes into the second, for readings of form."""
+
+import asyncio
+from datetime import UTC, datetime
+from typing import Any, cast
+
+import msgspec
+
+from app.db.pipeline import Pipeline
+from app.loop.readings.writer import load
+from app.loop.readings.writer.snapshot import Snapshot
+
+
+class Answer:
+    """A database that has this one answer."""
+
+    def __init__(self, **document: Any) -> None:
+        self.text = msgspec.json.encode({"streams": [], "named": None, "known": None} | document)
+
+    async def run(self, _steps: object) -> Any:
+        return (((self.text,),),)
+
+
+def test_tools_of_form_go_back_to_the_oldest_correction_that_any_reading_names() -> None:
+    """A correction that was released between two that are named is in the part of neither, and may be corrected only once."""
+    nine, ten = (datetime(2026, 3, 2, hour, tzinfo=UTC) for hour in (9, 10))
+    machines: dict[int, dict[str, Any]] = {1: {"number": 3, "since": None}}
+    named = [(1, 5, ten, None, None), (1, 3, nine, None, None), (1, 6, None, None, None)]
+    answer = cast("Pipeline", Answer(named=named))
+    asyncio.run(load._load(answer, {}, Snapshot(), (), machines, (), optimistic=True))
+    assert machines == {1: {"number": 3, "since": nine}}
