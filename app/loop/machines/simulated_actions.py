@@ -7,11 +7,12 @@ a role of its own, and where the tables lie on several nodes, no simulated machi
 
 from typing import Any
 
-from sqlalchemy import column, func, literal, select, table, text
+from sqlalchemy import delete, func, literal, select, text
 from sqlalchemy.orm import Session
 
 from app.access.audit.actions import record
 from app.access.keys import keys_changed
+from app.db.base import Base
 from app.db.events import publish
 from app.errors import Conflict, NotFound
 from app.language.i18n import _
@@ -22,10 +23,8 @@ from app.loop.tables.machines import Machine
 _MAY_GO = text("""
 SELECT current_setting('is_superuser')::bool AND NOT EXISTS (SELECT FROM pg_extension WHERE extname = 'citus')
 """)
-_OF_MACHINES = text("""
-SELECT c.relname FROM pg_class c JOIN pg_attribute a ON a.attrelid = c.oid AND a.attname = 'machine_id' AND NOT a.attisdropped
-WHERE c.relnamespace = current_schema()::regnamespace AND c.relkind IN ('r', 'p') AND NOT c.relispartition ORDER BY 1
-""")
+_ALONE = text("LOCK TABLE machine IN SHARE ROW EXCLUSIVE MODE")
+_HELD = text("SELECT FROM machine WHERE id = :id FOR UPDATE")
 
 
 def simulated_machine(session: Session) -> Machine | None:
@@ -40,6 +39,7 @@ def may_be_removed(session: Session) -> bool:
 
 def add_simulated_machine(session: Session, machine: MachineIn, actor: str) -> Machine:
     """Set up a simulated machine on an empty plant. Raises `Conflict` where there is a machine, or it could not be removed."""
+    session.execute(_ALONE)  # of two at once, the second finds the machine of the first
     if queries.machines(session, limit=1):
         raise Conflict(
             _("A simulated machine is for an empty plant, and this one has a machine."),
@@ -65,16 +65,19 @@ def remove_simulated_machine(session: Session, actor: str) -> dict[str, int]:
         raise Conflict(_("The role that serves may not remove anything."), _("A superuser of the database may."))
     queries.lock_machines(session, [machine.id])
     key, name, machine_id = machine.key, machine.name, machine.id
+    session.execute(
+        _HELD, {"id": machine_id}
+    )  # what refers to it alone, such as a note, waits, and then finds no machine
     session.execute(text("SET LOCAL session_replication_role = replica"))  # without triggers, which keep facts
     gone = {}
-    for relation in session.scalars(_OF_MACHINES).all():
-        of = table(relation, column("machine_id"))
-        removed = of.delete().where(of.c.machine_id == machine_id).returning(literal(1).label("one")).cte()
-        gone[relation] = session.scalar(select(func.count()).select_from(removed)) or 0
-    session.execute(table("machine", column("id")).delete().where(column("id") == machine_id))
+    for of in Base.metadata.sorted_tables:  # those of Inband, not all that a database may hold beside them
+        if "machine_id" in of.c:
+            removed = of.delete().where(of.c.machine_id == machine_id).returning(literal(1).label("one")).cte()
+            gone[of.name] = session.scalar(select(func.count()).select_from(removed)) or 0
+    session.execute(delete(Machine).where(Machine.id == machine_id).execution_options(synchronize_session=False))
     session.execute(text("SET LOCAL session_replication_role = origin"))
     session.expunge(machine)
-    before: dict[str, Any] = {"name": name} | {relation: count for relation, count in gone.items() if count}
+    before: dict[str, Any] = {"name": name} | {name: count for name, count in gone.items() if count}
     record(session, actor, "simulated machine removed", f"machine/{key}", before, None)
     publish(session, {"kind": "machine", "machine": key})
     keys_changed(session)

@@ -57,7 +57,8 @@ def start(request: Request, session: SessionDep, caller: Engineer) -> Response:
     machine = simulated_machine(session)
     if machine is not None:  # one that another process simulates still ends
         for old in keys.machine_keys(session, machine.id):
-            keys.revoke_machine_key(session, machine.key, old.id, caller.name)
+            if old.name == KEY_NAME:
+                keys.revoke_machine_key(session, machine.key, old.id, caller.name)
     key = _set_up(session, program, caller.name) if machine is None else machine.key
     secret = add_key(session, name=KEY_NAME, machine=key, actor=caller.name).secret
     begin = BackgroundTask(program.start, _own_address(request), secret, key)
