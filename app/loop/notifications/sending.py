@@ -51,17 +51,13 @@ def plan(session: Session, address: str, days_off: frozenset[date]) -> list[Job]
 
     address: of this server, for links. Another process that plans at this moment leaves nothing to do.
     """
-    rows = {
-        row.id: row
-        for row in session.scalars(
-            select(Receiver).where(
-                Receiver.deleted_at.is_(None),
-                or_(Receiver.person_id.is_(None), Receiver.person_id.not_in(WITHOUT_ACCESS)),
-            )
-        )
-    }
-    if not rows or not session.scalar(_PLANNING):
+    wanted = select(Receiver).where(
+        Receiver.deleted_at.is_(None),
+        or_(Receiver.person_id.is_(None), Receiver.person_id.not_in(WITHOUT_ACCESS)),
+    )
+    if not session.scalar(select(wanted.exists())) or not session.scalar(_PLANNING):
         return []
+    rows = {row.id: row for row in session.scalars(wanted)}  # after the lock: as the last one who planned has left them
     now: datetime = session.scalars(select(func.clock_timestamp())).one()
     _give_up(session, now)
     free = {number for number, row in rows.items() if row.busy_until is None or row.busy_until <= now}
@@ -89,18 +85,23 @@ def plan_shifts(session: Session, address: str, report: ShiftReport) -> list[Job
     wants = select(Receiver).where(
         Receiver.deleted_at.is_(None), Receiver.shift_report, Receiver.person_id.not_in(WITHOUT_ACCESS)
     )
-    rows = session.scalars(wants.order_by(Receiver.id)).all()
-    if not rows or not session.scalar(_PLANNING):
-        return []
     now: datetime = session.scalars(select(func.clock_timestamp())).one()
-    made: dict[datetime, tuple[str, str] | None] = {}
+
+    def due() -> list[tuple[Receiver, datetime]]:
+        session.expire_all()
+        rows = session.scalars(wants.order_by(Receiver.id)).all()
+        ends = ((row, end_of_shift(max(row.shift_reported or row.created_at, now - OLDEST_SHIFT))) for row in rows)
+        return [(row, end) for row, end in ends if end + SETTLED <= now and _may_have(row, now)]
+
+    made = {
+        end: report(session, end, address) for end in {end for _row, end in due()}
+    }  # alarms do not wait for these words
+    if not made or not session.scalar(_PLANNING):
+        return []
     jobs: list[Job] = []
-    for row in rows:
-        end = end_of_shift(max(row.shift_reported or row.created_at, now - OLDEST_SHIFT))
-        if end + SETTLED > now or len(jobs) >= MOST_AT_ONCE or not _may_have(row, now):
+    for row, end in due():  # again: another process may have planned meanwhile
+        if end not in made or len(jobs) >= MOST_AT_ONCE:
             continue
-        if end not in made:
-            made[end] = report(session, end, address)
         words = made[end]
         if words is None:
             row.shift_reported = end
