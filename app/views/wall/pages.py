@@ -6,10 +6,12 @@ sends it as a key with each look.
 
 import time
 from collections import OrderedDict, deque
-from collections.abc import Hashable
+from collections.abc import AsyncIterator, Hashable
 from threading import Lock
+from typing import cast
 
-from fastapi import APIRouter, Request, Response
+from fastapi import APIRouter, Depends, Request, Response, params
+from sqlalchemy.orm import Session
 from starlette.responses import PlainTextResponse
 
 from app.access import screens
@@ -18,7 +20,7 @@ from app.language.i18n import _
 from app.language.times import written
 from app.views.wall import queries
 from app.views.wall.queries import Wall
-from app.web.deps import IN_TURN, SessionDep
+from app.web.deps import SessionDep
 from app.web.templates import page
 
 router = APIRouter(include_in_schema=False)
@@ -59,7 +61,16 @@ class WallDoor:
 
     def __init__(self) -> None:
         self.rate = Rate()
-        self.shown: tuple[float, Wall] | None = None
+        self._shown: tuple[float, Wall] | None = None
+        self._alone = Lock()
+
+    def wall(self, session: Session) -> Wall:
+        """What is shown now. One look asks the database; those that come meanwhile wait for it and show the same."""
+        with self._alone:
+            if self._shown is None or time.monotonic() - self._shown[0] >= LASTS:
+                wall = queries.wall(session)
+                self._shown = (time.monotonic(), wall)  # by when it was found: a slow database is not asked more often
+            return self._shown[1]
 
 
 @router.get("/wall")
@@ -68,7 +79,15 @@ def shell(request: Request) -> Response:
     return page(request, "wall/shell.html", every=EVERY)
 
 
-@router.get("/wall/now", dependencies=[IN_TURN])
+async def _turn() -> AsyncIterator[None]:
+    yield
+
+
+_IN_TURN = cast("params.Depends", Depends(_turn, scope="function", max_concurrency=2))
+"""Screens wait for each other, and nobody who signs in waits for them."""
+
+
+@router.get("/wall/now", dependencies=[_IN_TURN])
 def look(request: Request, session: SessionDep) -> Response:
     """The screen as it is now. A key that is no screen's is answered 401, no way to sign in: nobody does there.
 
@@ -81,9 +100,7 @@ def look(request: Request, session: SessionDep) -> Response:
         door.rate.call(request.client.host if request.client else "", now)
         return PlainTextResponse(_("This link does not open a wall screen, or was revoked."), 401)
     door.rate.call(screen, now)
-    if door.shown is None or now - door.shown[0] >= LASTS:
-        door.shown = (now, queries.wall(session))
-    wall = door.shown[1]
+    wall = door.wall(session)
     return page(
         request, "wall/now.html", wall=wall, since=written(wall.since, "%H:%M"), at=written(wall.at, "%H:%M:%S")
     )
