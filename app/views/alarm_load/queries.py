@@ -27,6 +27,7 @@ from app.quality.what_if import queries as what_if
 
 MOST_ALARMS = MOST_MACHINES = 100_000
 MOST_DAYS = 400
+EARLIEST_YEAR = 1900
 WIDER = 1.25
 """Factor of a wear limit that is tried as the quieter one."""
 SOONER, REPLAYED = 0.5, 1000
@@ -133,6 +134,8 @@ def alarm_load(
     """
     chosen = machine_named(session, machine) if machine is not None else None
     end = min(period.end or now, now)
+    if end.year < EARLIEST_YEAR:
+        raise Invalid.at("to", _("must not lie before {year}").format(year=EARLIEST_YEAR))
     start = period.start or _round(end - timedelta(days=DAYS))
     if start >= end or end - start > timedelta(days=MOST_DAYS):
         raise Invalid.at("from", _("must lie before the end, and at most {n} days before it").format(n=MOST_DAYS))
@@ -146,8 +149,10 @@ def alarm_load(
     by_machine: dict[int, list[datetime]] = defaultdict(list)
     for row in rows:
         by_machine[row.machine_id].append(row.raised_at)
+    quiet = load((), start, end)  # of a thousand machines most are
+    loads = {number: load(moments, start, end) for number, moments in by_machine.items()}
     positions = [
-        Position(each, load(by_machine[number], start, end), sum(one.machine.id == number for one in stale))
+        Position(each, loads.get(number, quiet), sum(one.machine.id == number for one in stale))
         for number, each in known.items()
     ]
     if chosen is None:

@@ -1,7 +1,7 @@
 """A shift in words, for the mail at its end."""
 
 import logging
-from datetime import datetime, timedelta
+from datetime import UTC, datetime, timedelta
 from urllib.parse import urlencode
 
 from sqlalchemy.orm import Session
@@ -23,7 +23,7 @@ def shift_words(session: Session, end: datetime, address: str) -> tuple[str, str
 
     Where it cannot be worked out, the mail leads to its page: nobody waits for the next one in vain.
     """
-    inside = end - timedelta(microseconds=1)
+    inside = end.astimezone(UTC) - timedelta(microseconds=1)  # on the clock on the wall, the hour before may not exist
     link = f"{address}/shift?{urlencode({'at': inside.isoformat()})}"
     try:
         with session.begin_nested():

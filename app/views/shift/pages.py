@@ -42,7 +42,9 @@ def shift_page(
         "shift/shift.html",
         shift=found,
         machines=machines.machines(session),
-        back=address("/shift", machine=machine, at=begin_of_shift(start - timedelta(microseconds=1)).isoformat()),
+        back=address(
+            "/shift", machine=machine, at=begin_of_shift(start.astimezone(UTC) - timedelta(microseconds=1)).isoformat()
+        ),
         onward=None if found.running else address("/shift", machine=machine, at=end.isoformat()),
         entered="shifts" in settings.model_fields_set,
         shifts=settings.shifts.replace(",", ", "),

@@ -64,6 +64,10 @@ def test_it_counts_by_position_and_names_what_makes_the_noise(ran: Shop) -> None
     assert len(found["stale"]) == 1
 
 
+def test_a_time_before_all_machines_is_refused(shop: Shop) -> None:
+    shop.call("GET", "/alarm-load?to=0001-01-05T00:00:00Z", 422)
+
+
 def test_a_wider_wear_limit_is_replayed_from_the_readings(ran: Shop) -> None:
     for micrometres in (320, 500):
         ran.read(micrometres)
