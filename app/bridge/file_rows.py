@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 
 from app.bridge.json_text import read_json
 from app.files.formats import aqdef, delimited
-from app.files.formats.headings import TOP, Heading, as_wide, heading
+from app.files.formats.headings import TOP, Heading, as_wide, heading, others
 from app.files.formats.repeats import Repeats
 from app.files.formats.units import is_unit_column, unit_above, unit_in
 
@@ -129,7 +129,8 @@ def has(row: Mapping[str, Any], column: str) -> bool:
 def _heading(top: Sequence[delimited.Row], table: Table) -> Heading:
     """The names of the columns: where an import finds them; else in the first row that has all that are wanted."""
     found = heading(top, ragged=table.sheet) or Heading(top[0].line, ())
-    plain = [Heading(row.line, tuple(cell.strip().lstrip("\ufeff") for cell in row.cells)) for row in top]
+    near = others(top, found, named=True)
+    plain = [Heading(row.line, tuple(cell.strip().lstrip("\ufeff") for cell in row.cells)) for row in near]
     fitting = (each for each in [found, *plain] if _has_all(each.names, table.columns))
     return next(fitting, plain[0])
 

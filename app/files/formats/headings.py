@@ -1,6 +1,6 @@
 """Headings of tables: below titles, in lines of their own, with cells that are merged across and downwards."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from itertools import accumulate
 from typing import NamedTuple
 
@@ -9,6 +9,8 @@ from app.files.formats.delimited import Row
 from app.files.formats.units import is_unit_column, length_unit
 
 TOP = 500  # rows in which the heading is looked for
+FIRST = 50  # of them, in which another may stand than the one that is found
+TABLE = 2  # rows of values that make a table
 OTHER_UNITS = {
     "",
     "-",
@@ -58,7 +60,7 @@ def heading(top: Sequence[Row], said: int | None = None, *, ragged: bool = False
     last = _last_head(top) if said is None else next((at for at, row in enumerate(top) if row.line == said), None)
     if last is None:
         return None
-    width = max(len(row.cells) for row in top) if ragged else len(top[last].cells)
+    width = max(len(row.cells) for row in top[: max(FIRST, last + 2)]) if ragged else len(top[last].cells)
     names, *above = ([cell.strip() for cell in as_wide(row, width).cells] for row in reversed(top[: last + 1]))
     groups = [cells for cells in above if len(list(filter(None, cells))) > 1]  # a single cell is a title
     for cells in groups:
@@ -74,6 +76,26 @@ def heading(top: Sequence[Row], said: int | None = None, *, ragged: bool = False
     if below is None or not _are_units(names, below.cells):
         return Heading(top[last].line, tuple(names))
     return Heading(top[last].line, tuple(names), tuple(map(length_unit, below.cells)), below.line)
+
+
+def others(top: Sequence[Row], found: Heading, *, named: bool = False) -> Iterator[Row]:
+    """Rows that may be the heading in place of the one found: near the beginning, and none below the rows of its own table.
+
+    Further down is another table, such as one of means. Two rows with two values or more below names make a table; a title or a
+    line of a preamble is none. named: a person has named the columns of the right one, so it may be any near the beginning.
+
+    >>> rows = [Row(1, ["Part", "D40", "D41"]), *[Row(at, ["P1", "40.01", "41.02"]) for at in (2, 3)], Row(4, ["Feature", "Value"])]
+    >>> [row.line for row in others(rows, Heading(1, ("Part", "D40", "D41")))]
+    [1, 2, 3]
+    """
+    measured = 0
+    for at, row in enumerate(top):
+        if row.line > found.line:
+            if at >= FIRST or measured == TABLE:
+                return
+            beside = zip(found.names, row.cells, strict=False)
+            measured += not named and sum(bool(name) and delimited.is_value(cell) for name, cell in beside) > 1
+        yield row
 
 
 def as_wide(row: Row, width: int) -> Row:

@@ -15,7 +15,7 @@ from app.files.formats.cell_values import slashed
 from app.files.formats.column_names import NAMES
 from app.files.formats.delimited import Row, Unusable
 from app.files.formats.file_times import FileTimes, times_of
-from app.files.formats.headings import TOP, as_wide, heading
+from app.files.formats.headings import TOP, as_wide, heading, others
 from app.files.formats.units import LENGTHS, UnknownUnit, unit_above, unit_behind, unit_in
 from app.language.i18n import _
 from app.loop.readings.origin import COLUMNS
@@ -253,8 +253,9 @@ def _csv_layout(path: Path, wishes: Wishes, zone: ZoneInfo | None, kind: str = "
         words = _("Line {n} is empty, or too far below to be the header of the columns.")
         raise wrong("header_line", words.format(n=wishes.header_line))
     if wishes.header_line is None and not _fits(found.names, wishes.mapping):
-        others = (row for row in top if not any(map(delimited.is_value, row.cells)))
-        fitting = (row.line for row in others if _fits([cell.strip() for cell in row.cells], wishes.mapping))
+        by_name = any(column and not column.isdigit() for column in wishes.mapping.values())
+        near = (row for row in others(top, found, named=by_name) if not any(map(delimited.is_value, row.cells)))
+        fitting = (row.line for row in near if _fits([cell.strip() for cell in row.cells], wishes.mapping))
         found = heading(top, next(fitting, None), ragged=kind == "sheet") or found
     head, header, units, end = found
     _refuse_wide(header)

@@ -427,6 +427,31 @@ def test_a_heading_may_be_far_below_the_beginning(tmp_path: Path) -> None:
     assert look(path, Wishes(timezone="UTC")).header_line == 121
 
 
+@pytest.mark.parametrize("parts", [20, 300])
+def test_a_table_of_means_below_a_wide_one_is_not_read_in_its_place(tmp_path: Path, parts: int) -> None:
+    rows = "".join(f"P{at};40,01;41,02\n" for at in range(parts))
+    path = write(tmp_path, f"Part;D40;D41\n{rows}\nFeature;Value\nMean D40;40,01\n")
+    assert look(path, Wishes(), complete=False).header == ("Part", "D40", "D41")
+    assert good(path, mapping={"measured": "2"}, last_line=parts + 1) == [(40.01, f"P{at}") for at in range(parts)]
+    [flaw] = [each for each in read(path, mapping={"measured": "2"}) if isinstance(each, Flaw)]
+    assert flaw.line == parts + 3, "what is below it is refused until its last line is said"
+    below = Table("utf-8", None, {"Feature", "Value"}, set())
+    taken = [row for _line, row in csv_rows(path, below) if isinstance(row, Mapping)]
+    assert len(taken) == (1 if parts == 20 else 0), "a bridge is given the names, and looks near the beginning"
+
+
+def test_a_cell_far_beside_the_table_of_a_sheet_is_no_part_of_it(tmp_path: Path) -> None:
+    book = Workbook()
+    assert book.active is not None
+    book.active.append(["Part", "Measured [mm]"])
+    for at in range(80):
+        book.active.append([f"P{at}", 40.01])
+    book.active.cell(70, MOST_COLUMNS + 100, "checked")
+    book.save(tmp_path / "a.xlsx")
+    with text_of(tmp_path / "a.xlsx", None) as path:
+        assert look(path, Wishes(), "a.xlsx").header == ("Part", "Measured [mm]")
+
+
 @pytest.mark.parametrize(
     ("text", "parts"),
     [
