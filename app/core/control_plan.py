@@ -4,6 +4,8 @@ A part counts as cut once another characteristic of it was measured, or once a l
 that is being worked on is never missed: it counts when a later one was begun. Where nothing tells of parts their number is None:
 not known is not missed. Minutes count while the machine runs: between two readings of the same part's characteristics that are at
 most `PAUSE` apart. Times are seconds of one clock.
+
+A tool change or an alarm asks for every part from its moment on: parts that were cut before it are judged by the plan alone.
 """
 
 from collections import Counter
@@ -11,6 +13,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 from itertools import pairwise
+from math import inf
 from typing import NamedTuple
 
 from app.core.affected import names_between
@@ -79,41 +82,68 @@ class Ran(NamedTuple):
     """All that is known of the time since a reading.
 
     parts: parts cut since and not measured, without the one that is being worked on; None: nothing tells. minutes: that the
-    machine ran. shifts: shifts that are over, in which the part was made and not measured.
+    machine ran. shifts: shifts that are over, in which the part was made and not measured. parts_after: as parts, of those
+    that were begun after the event for which every part is measured.
     """
 
     parts: int | None = None
     minutes: float = 0.0
     shifts: int = 0
+    parts_after: int | None = None
+
+
+class Event(NamedTuple):
+    """A tool change or an alarm. at: its moment. readings: of the characteristic since then."""
+
+    why: Tightened
+    at: float
+    readings: int
 
 
 class Rhythm(NamedTuple):
-    """The interval in force: every n-th part, or None where parts do not count. tightened: why it is every part now."""
+    """The interval in force: every n-th part, or None where parts do not count. tightened: why it is every part, from `at` on."""
 
     every: int | None
     tightened: Tightened | None = None
+    at: float = -inf
 
 
 class Judged(NamedTuple):
-    """The state of a plan. by: the rule that says so. next_in: parts until the one to measure (1: the next); None: not known."""
+    """The state of a plan.
+
+    by: the rule that says so. next_in: parts until the one to measure (1: the next); None: not known. every: the interval that
+    was not kept, where parts say so.
+    """
 
     due: Due
     by: By | None = None
     next_in: int | None = None
+    every: int | None = None
 
 
-def rhythm(plan: Plan, since_change: int | None, since_alarm: int | None) -> Rhythm:
-    """The interval in force after N readings since the tool change and since the last alarm; None: there was none.
+def rhythm(plan: Plan, events: Iterable[Event] = ()) -> Rhythm:
+    """The interval in force after tool changes and alarms; of several that hold, every part counts from the first one on.
 
-    >>> plan = Plan(every=5, after_change=3, after_alarm=10)
-    >>> rhythm(plan, 2, None), rhythm(plan, 3, 9).every, rhythm(plan, 3, 10).every
-    (Rhythm(every=1, tightened=<Tightened.TOOL_CHANGE: 'tool_change'>), 1, 5)
+    >>> change, alarm = Event(Tightened.TOOL_CHANGE, 60.0, 2), Event(Tightened.ALARM, 90.0, 5)
+    >>> rhythm(Plan(every=5, after_change=3), [change, alarm]), rhythm(Plan(every=5, after_alarm=5), [change, alarm]).every
+    (Rhythm(every=1, tightened=<Tightened.TOOL_CHANGE: 'tool_change'>, at=60.0), 5)
     """
-    if since_alarm is not None and since_alarm < plan.after_alarm:
-        return Rhythm(1, Tightened.ALARM)
-    if since_change is not None and since_change < plan.after_change:
-        return Rhythm(1, Tightened.TOOL_CHANGE)
-    return Rhythm(plan.every)
+    most = {Tightened.TOOL_CHANGE: plan.after_change, Tightened.ALARM: plan.after_alarm}
+    hold = [event for event in events if event.readings < most[event.why]]
+    if not hold:
+        return Rhythm(plan.every)
+    alarm = any(event.why is Tightened.ALARM for event in hold)
+    return Rhythm(1, Tightened.ALARM if alarm else Tightened.TOOL_CHANGE, min(event.at for event in hold))
+
+
+def in_time(moments: Iterable[tuple[int, Moment]], begin: tuple[int, Moment]) -> list[tuple[int, Moment]]:
+    """Numbered readings in the order of their time, from `begin` on. One that comes late, measured before it, is none of them.
+
+    >>> early, late, newest = (1, Moment(60.0, 1)), (2, Moment(50.0, 1)), (3, Moment(70.0, 1))
+    >>> [number for number, _moment in in_time([late, newest], early)]
+    [1, 3]
+    """
+    return [begin, *sorted((each for each in moments if each[1].at >= begin[1].at), key=lambda each: each[1].at)]
 
 
 def ran(
@@ -124,23 +154,33 @@ def ran(
     now: Moment,
     measured: frozenset[str] = frozenset(),
     closed: bool = False,
+    event: float = -inf,
 ) -> Ran:
     """All that is known of the time from the reading `last` to `now`.
 
     others: readings of other characteristics of the same part between them, in any order. closed: `now` is the reading that
-    ended it; else it is this moment. measured: names of parts that were measured, whenever.
+    ended it; else it is this moment, and readings of a clock that is ahead of it count too. measured: names of parts that
+    were measured, whenever. event: from it on every part was to be measured.
 
     >>> others = [Moment(60.0, 2, "P8"), Moment(120.0, 2, "P9"), Moment(180.0, 2, "P10")]
     >>> ran(Plan(every=1), Moment(0.0, 1, "P7"), others, now=Moment(200.0, 1))
-    Ran(parts=2, minutes=3.0, shifts=0)
+    Ran(parts=2, minutes=3.0, shifts=0, parts_after=2)
     """
-    signs = sorted(each for each in others if last.at < each.at <= now.at)
+    until = now.at if closed else inf
+    signs = sorted((each for each in others if last.at < each.at <= until), key=lambda each: each.at)
     steps = (after.at - before.at for before, after in pairwise([last, *signs]))
-    shifts = {each.shift for each in signs} - {last.shift, now.shift}
+    ended = now.part if closed else None
+    parts = parts_after = _parts(plan, last, signs, ended, measured)
+    if event > last.at:
+        before = [each.part for each in signs if each.at <= event and each.part is not None]
+        base = last._replace(part=before[-1] if before else None)
+        begun_before = measured | {*before} | ({last.part} if last.part is not None else set())
+        parts_after = _parts(plan, base, [each for each in signs if each.at > event], ended, begun_before)
     return Ran(
-        _parts(plan, last, signs, now.part if closed else None, measured),
+        parts,
         sum(step for step in steps if step <= PAUSE) / 60,
-        len(shifts),
+        len({each.shift for each in signs if last.shift < each.shift < now.shift}),
+        parts_after,
     )
 
 
@@ -162,19 +202,22 @@ def judged(plan: Plan, interval: Rhythm, since: Ran, *, in_this_shift: bool, clo
     """Judge the time since the last reading. in_this_shift: it lies in the current shift. closed: the next reading has come.
 
     >>> plan = Plan(every=5)
-    >>> [judged(plan, rhythm(plan, None, None), Ran(parts), in_this_shift=True).due.value for parts in (3, 4, 5)]
+    >>> [judged(plan, rhythm(plan), Ran(parts), in_this_shift=True).due.value for parts in (3, 4, 5)]
     ['later', 'due', 'missed']
     """
     if not plan.asks:
         return Judged(Due.NOT_PLANNED)
-    every, parts = interval.every, since.parts
-    under_way = (
-        0 if closed and plan.numbered else plan.on_the_way
-    )  # a number between two that were measured is late for good
-    known = None if parts is None else max(0, parts - under_way)
-    next_in = None if every is None or (parts is None and every > 1) else max(1, every - (known or 0))
-    if every is not None and known is not None and known >= every:
-        return Judged(Due.MISSED, By.PARTS, 1)
+    # A number between two that were measured is late for good.
+    under_way = 0 if closed and plan.numbered else plan.on_the_way
+    every = interval.every
+    known, known_after = (
+        None if parts is None else max(0, parts - under_way) for parts in (since.parts, since.parts_after)
+    )
+    next_in = None if every is None or (known is None and every > 1) else max(1, every - (known or 0))
+    if plan.every is not None and known is not None and known >= plan.every:
+        return Judged(Due.MISSED, By.PARTS, 1, plan.every)
+    if interval.tightened and known_after:
+        return Judged(Due.MISSED, By.PARTS, 1, 1)
     if plan.minutes is not None and since.minutes > plan.minutes:
         return Judged(Due.MISSED, By.MINUTES, 1)
     if plan.per_shift and since.shifts:

@@ -8,7 +8,7 @@ from sqlalchemy.orm import Session
 
 from app.access.audit.actions import record
 from app.access.callers import Caller
-from app.core.control_plan import Due, Plan
+from app.core.control_plan import Due, Judged, Plan, Ran
 from app.db.events import publish
 from app.language.i18n import _
 from app.loop.alarms import actions as alarms
@@ -86,8 +86,7 @@ def keep(session: Session, machine_id: int, characteristic_id: int) -> None:
         _end(session, row, machine.key, characteristic.key, by=ACTOR, comment=_("Measured again"), outcome=outcome)
         open_ = None
     for each in late:
-        missed = _missed(row, each.after, each.every, each.judged.by)
-        _known(missed, each.ran)
+        missed = _missed(row, each.after, each.judged, each.ran)
         missed.until, missed.ended_at = each.until, datetime.now(UTC)
         session.add(missed)
     if open_ is not None:
@@ -101,7 +100,7 @@ def keep(session: Session, machine_id: int, characteristic_id: int) -> None:
             ControlPlan.characteristic_id == characteristic_id,
             ControlPlan.since == row.since,
         )
-        .values(seen=found.sequence)
+        .values(seen=found.seen)
         .execution_options(synchronize_session=False)
     )
     if late:
@@ -114,25 +113,30 @@ def _changes_alarm(found: Look) -> bool:
     return found.judged.due is Due.MISSED
 
 
-def _missed(row: ControlPlan, after: int, every: int | None, by: Any) -> MissedMeasurement:
-    return MissedMeasurement(
-        machine_id=row.machine_id, characteristic_id=row.characteristic_id, after=after, every=every, by=by.value
+def _missed(row: ControlPlan, after: int, verdict: Judged, ran: Ran) -> MissedMeasurement:
+    missed = MissedMeasurement(
+        machine_id=row.machine_id,
+        characteristic_id=row.characteristic_id,
+        after=after,
+        every=verdict.every,
+        by=verdict.by.value if verdict.by else None,
     )
+    _known(missed, ran)
+    return missed
 
 
-def _known(missed: MissedMeasurement, ran: Any) -> None:
+def _known(missed: MissedMeasurement, ran: Ran) -> None:
     missed.parts, missed.minutes, missed.shifts = ran.parts, ran.minutes, ran.shifts
 
 
 def _raise(session: Session, found: Look, machine: str, characteristic: str) -> None:
     """Put the missed measurement on record, and raise its alarm; the machine is locked."""
     row = found.row
-    missed = _missed(row, found.sequence, found.rhythm.every, found.judged.by)
-    _known(missed, found.since)
+    missed = _missed(row, found.sequence, found.judged, found.since)
     session.add(missed)
     data = {
         "by": missed.by,
-        "every": missed.every if missed.by == "parts" else None,
+        "every": missed.every,
         "minutes_planned": row.minutes if missed.by == "minutes" else None,
         "parts": missed.parts,
         "minutes": missed.minutes,

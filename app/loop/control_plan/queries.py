@@ -1,6 +1,6 @@
 """Control plans, the state of each now, and the measurements that were missed. Never writes."""
 
-from bisect import bisect_left, bisect_right
+from bisect import bisect_right
 from collections.abc import Sequence
 from datetime import UTC, datetime, timedelta
 from itertools import pairwise
@@ -9,7 +9,20 @@ from typing import NamedTuple
 from sqlalchemy import ColumnElement, and_, func, or_, select, true
 from sqlalchemy.orm import Session
 
-from app.core.control_plan import Due, Judged, Moment, Plan, Ran, Rhythm, judged, ran, rhythm
+from app.core.control_plan import (
+    Due,
+    Event,
+    Judged,
+    Moment,
+    Plan,
+    Ran,
+    Rhythm,
+    Tightened,
+    in_time,
+    judged,
+    ran,
+    rhythm,
+)
 from app.core.decision.step import Code
 from app.core.period import ALWAYS, Period
 from app.db.period import in_period
@@ -18,23 +31,24 @@ from app.loop.characteristics.queries import CurrentCharacteristic
 from app.loop.control_plan.alarm_kinds import MISSED
 from app.loop.control_plan.tables import ControlPlan, MissedMeasurement
 from app.loop.tables.alarms import Alarm
-from app.loop.tables.characteristics import Characteristic
+from app.loop.tables.characteristics import Characteristic, ParametersVersion
 from app.loop.tables.machines import Machine
 from app.loop.tables.readings import Reading, Stream
+from app.loop.tables.tools import Tool
 
 MOST = 1_500
 """Readings of each characteristic that are looked at, the newest."""
+FURTHEST = 5_000
+"""Readings in which those of the characteristic itself are looked for: an import may have brought more."""
 LATELY = timedelta(days=30)
 """As far back as pages count."""
-LONGEST = 1_000  # readings after an alarm that a plan can ask for
 
 
 class Interval(NamedTuple):
-    """The time between two readings in a row (`after`, `until`) in which the plan was not kept. every: the interval then."""
+    """The time between two readings in a row (`after`, `until`) in which the plan was not kept."""
 
     after: int
     until: int | None
-    every: int | None
     ran: Ran
     judged: Judged
 
@@ -42,11 +56,13 @@ class Interval(NamedTuple):
 class Look(NamedTuple):
     """A plan as it is kept now. late: closed intervals in which it was not kept, of the readings since the last look.
 
-    sequence: the last reading. since: all that is known of the time after it. open: the missed measurement that is open.
+    sequence: the last reading in time. seen: the last one that came. since: all that is known of the time after it. open: the
+    missed measurement that is open.
     """
 
     row: ControlPlan
     sequence: int
+    seen: int
     rhythm: Rhythm
     since: Ran
     judged: Judged
@@ -98,58 +114,79 @@ def look(session: Session, row: ControlPlan, now: datetime | None = None) -> Loo
     """Look at a plan: what was missed since the last look, and what is due now."""
     now = now or datetime.now(UTC)
     plan, stream = row.plan, session.get_one(Stream, (row.machine_id, row.characteristic_id), populate_existing=True)
-    own = _own(session, row)
-    seen, begin = row.seen, Moment(row.since.timestamp(), 0)
-    if own and (own[0][0] <= seen or len(own) == MOST):
-        seen, begin = own[0]
-    begin = begin._replace(at=max(begin.at, row.since.timestamp()), shift=_shift(max(begin.at, row.since.timestamp())))
-    moments = [(seen, begin), *((sequence, moment) for sequence, moment in own if sequence > seen)]
-    others = _others(session, row, begin.at)
+    own = _own(session, row, stream)
+    begin = _begin(row, stream, own, now)
+    moments = in_time(((each.sequence, each.moment) for each in own if each.sequence > row.seen), begin)
+    moments = [(sequence, moment._replace(shift=_shift(moment.at))) for sequence, moment in moments]
+    others = _others(session, row, moments[0][1].at)
     times = [each.at for each in others]
-    measured = frozenset(moment.part for _sequence, moment in own if moment.part is not None)
-    alarms = _alarms(session, row, stream) if plan.after_alarm else []
+    measured = frozenset(each.moment.part for each in own if each.moment.part is not None)
+    events = _events(session, row, stream, own)
 
     def in_force(sequence: int) -> Rhythm:
-        changed = sequence - stream.sequence_at_tool_change
-        alarmed = max((at for at in alarms if at <= sequence), default=None)
-        return rhythm(plan, changed if changed >= 0 else None, None if alarmed is None else sequence - alarmed)
+        come = bisect_right(own, sequence, key=lambda each: each.sequence)
+        return rhythm(plan, (Event(why, at, max(0, come - before)) for why, at, before in events))
 
     late = []
     for (after, last), (until, this) in pairwise(moments):
         between = others[bisect_right(times, last.at) : bisect_right(times, this.at)]
-        passed = ran(plan, last, between, now=this, measured=measured, closed=True)
-        verdict = judged(plan, in_force(after), passed, in_this_shift=True, closed=True)
+        force = in_force(after)
+        passed = ran(plan, last, between, now=this, measured=measured, closed=True, event=force.at)
+        verdict = judged(plan, force, passed, in_this_shift=True, closed=True)
         if verdict.due is Due.MISSED:
-            late.append(Interval(after, until, in_force(after).every, passed, verdict))
+            late.append(Interval(after, until, passed, verdict))
     sequence, last = moments[-1]
     here = Moment(now.timestamp(), 0, None, _shift(now.timestamp()))
-    since = ran(plan, last, others[bisect_left(times, last.at) :], now=here, measured=measured)
-    force = in_force(sequence)
-    verdict = judged(plan, force, since, in_this_shift=bool(sequence) and last.shift == here.shift)
-    return Look(row, sequence, force, since, verdict, late, open_of(session, row))
+    force = in_force(max(sequence, row.seen, *(each.sequence for each in own[-1:])))
+    since = ran(plan, last, others[bisect_right(times, last.at) :], now=here, measured=measured, event=force.at)
+    verdict = judged(plan, force, since, in_this_shift=bool(sequence) and last.shift >= here.shift)
+    seen = max(row.seen, stream.sequence, *(each.sequence for each in own[-1:]))
+    return Look(row, sequence, seen, force, since, verdict, late, open_of(session, row))
 
 
 def _shift(at: float) -> float:
     return begin_of_shift(datetime.fromtimestamp(at, UTC)).timestamp()
 
 
-def _own(session: Session, row: ControlPlan) -> list[tuple[int, Moment]]:
-    """Readings of the characteristic from the last one that was looked at, ascending."""
+class _Own(NamedTuple):
+    """A reading of the characteristic itself. received: when it came, seconds."""
+
+    sequence: int
+    received: float
+    moment: Moment
+
+
+def _own(session: Session, row: ControlPlan, stream: Stream) -> list[_Own]:
+    """The newest readings of the characteristic, in the order in which they came. None was measured after it came."""
     newest = (
-        select(Reading.sequence, Reading.measured_at, Reading.part)
+        select(Reading.sequence, Reading.received_at, Reading.measured_at, Reading.part)
         .where(
             Reading.machine_id == row.machine_id,
             Reading.characteristic_id == row.characteristic_id,
-            Reading.sequence >= row.seen,
-            (Reading.code != Code.IMPORTED) | (Reading.sequence == row.seen),
+            Reading.sequence > stream.sequence - FURTHEST,
+            Reading.code != Code.IMPORTED,
         )
         .order_by(Reading.sequence.desc())
         .limit(MOST)
     )
     return [
-        (sequence, Moment(at.timestamp(), row.characteristic_id, part, _shift(at.timestamp())))
-        for sequence, at, part in reversed(session.execute(newest).all())
+        _Own(sequence, received.timestamp(), Moment(min(at, received).timestamp(), row.characteristic_id, part))
+        for sequence, received, at, part in reversed(session.execute(newest).all())
     ]
+
+
+def _begin(row: ControlPlan, stream: Stream, own: Sequence[_Own], now: datetime) -> tuple[int, Moment]:
+    """The last reading in time of those that were looked at before, not before the plan: what was cut under another is no matter."""
+    before = [each for each in own if each.sequence <= row.seen]
+    since = Moment(row.since.timestamp(), row.characteristic_id)
+    if not before and own and (len(own) == MOST or stream.sequence > FURTHEST):
+        before = [own[0]]
+    if before:
+        newest = max(before, key=lambda each: each.moment.at)
+        return newest.sequence, newest.moment if newest.moment.at >= since.at else since
+    if not own and stream.last_measured_at is not None:
+        since = since._replace(at=max(since.at, min(stream.last_measured_at, now).timestamp()))
+    return row.seen, since
 
 
 def _others(session: Session, row: ControlPlan, since: float) -> list[Moment]:
@@ -157,7 +194,7 @@ def _others(session: Session, row: ControlPlan, since: float) -> list[Moment]:
     own = session.get_one(Characteristic, (row.machine_id, row.characteristic_id))
     moment = datetime.fromtimestamp(since, UTC)
     query = (
-        select(Reading.characteristic_id, Reading.part, Reading.measured_at)
+        select(Reading.characteristic_id, Reading.part, func.least(Reading.measured_at, Reading.received_at))
         .join(
             Stream,
             (Stream.machine_id == Reading.machine_id) & (Stream.characteristic_id == Reading.characteristic_id),
@@ -178,34 +215,62 @@ def _others(session: Session, row: ControlPlan, since: float) -> list[Moment]:
             Reading.measured_at > moment,
             Reading.code != Code.IMPORTED,
         )
-        .order_by(Reading.measured_at)
     )
-    return [Moment(at.timestamp(), source, part, _shift(at.timestamp())) for source, part, at in session.execute(query)]
+    found = [
+        Moment(at.timestamp(), source, part, _shift(at.timestamp())) for source, part, at in session.execute(query)
+    ]
+    return sorted(found, key=lambda each: each.at)
 
 
-def _alarms(session: Session, row: ControlPlan, stream: Stream) -> list[int]:
-    """The last reading before the end of each alarm about the characteristic or its tool, as far as the plan looks back."""
-    before = (
-        select(func.max(Reading.sequence))
-        .where(
-            Reading.machine_id == row.machine_id,
-            Reading.characteristic_id == row.characteristic_id,
-            Reading.sequence > stream.sequence - LONGEST,
-            Reading.received_at <= Alarm.last_at,
+def _events(
+    session: Session, row: ControlPlan, stream: Stream, own: Sequence[_Own]
+) -> list[tuple[Tightened, float, int]]:
+    """The last tool change and the alarms about the characteristic or its tool, by time. Last: how many of `own` came before."""
+
+    def come(at: datetime) -> int:
+        return bisect_right(own, at.timestamp(), key=lambda each: each.received)
+
+    found = []
+    changed = _changed_at(session, row, stream) if row.after_change else None
+    if changed is not None:
+        found.append((Tightened.TOOL_CHANGE, changed.timestamp(), come(changed)))
+    if row.after_alarm:
+        about = Alarm.characteristic_id == row.characteristic_id
+        if stream.tool_memory:
+            about = or_(about, and_(Alarm.characteristic_id.is_(None), Alarm.tool_memory == stream.tool_memory))
+        alarms = session.execute(
+            select(Alarm.characteristic_id, func.coalesce(Alarm.last_sequence, Alarm.sequence), Alarm.last_at)
+            .where(Alarm.machine_id == row.machine_id, about, Alarm.kind != MISSED.name)
+            .order_by(Alarm.id.desc())
+            .limit(100)
         )
-        .correlate(Alarm)
+        for of, sequence, at in alarms:
+            by_reading = of is not None and sequence is not None  # else the number is one of another characteristic
+            before = bisect_right(own, sequence, key=lambda each: each.sequence) if by_reading else come(at)
+            found.append((Tightened.ALARM, at.timestamp(), before))
+    if stream.sequence > FURTHEST and len(own) < MOST:  # more was read since than is known here
+        found = [event for event in found if event[2]]
+    return found
+
+
+def _changed_at(session: Session, row: ControlPlan, stream: Stream) -> datetime | None:
+    """The moment at which the tool was changed, or the characteristic given to this tool; None: never."""
+    tool = session.scalar(
+        select(Tool.changed_at).where(Tool.machine_id == row.machine_id, Tool.number == stream.tool_memory)
+    )
+    versions = (
+        ParametersVersion.machine_id == row.machine_id,
+        ParametersVersion.characteristic_id == row.characteristic_id,
+    )
+    another = (
+        select(func.max(ParametersVersion.version))
+        .where(*versions, ParametersVersion.parameters["tool_memory"].as_integer() != stream.tool_memory)
         .scalar_subquery()
     )
-    own = Alarm.characteristic_id == row.characteristic_id
-    if stream.tool_memory:
-        own = or_(own, and_(Alarm.characteristic_id.is_(None), Alarm.tool_memory == stream.tool_memory))
-    found = session.scalars(
-        select(func.coalesce(Alarm.last_sequence, Alarm.sequence, before, 0))
-        .where(Alarm.machine_id == row.machine_id, own, Alarm.kind != MISSED.name)
-        .order_by(Alarm.id.desc())
-        .limit(100)
+    given = session.scalar(
+        select(func.min(ParametersVersion.created_at)).where(*versions, ParametersVersion.version > another)
     )
-    return list(found)
+    return max((at for at in (tool, given) if at is not None), default=None)
 
 
 def open_of(session: Session, row: ControlPlan) -> MissedMeasurement | None:

@@ -93,7 +93,7 @@ class DueOut(BaseModel):
         int | None, Field(description="Parts cut since the last reading and not measured; null: nothing tells of them.")
     ]
     minutes: Annotated[float, Field(description="Minutes that the machine is known to have run since.")]
-    last_sequence: Annotated[int, Field(description="The last reading; 0: none yet.")]
+    last_sequence: Annotated[int, Field(description="The last reading by the time it was measured; 0: none yet.")]
     text: Annotated[str, Field(description="The state in words.")]
 
     @classmethod
@@ -124,7 +124,7 @@ class MissedOut(BaseModel):
     characteristic: str
     machine: str
     by: Annotated[Literal["parts", "minutes", "shift"], Field(description="The rule that was not kept.")]
-    every: Annotated[int | None, Field(description="The interval in force then.")]
+    every: Annotated[int | None, Field(description="The interval that was not kept; null: it was another rule.")]
     after: Annotated[int, Field(description="The last reading before; 0: none yet.")]
     until: Annotated[int | None, Field(description="The reading that ended it; null: none, or the plan was changed.")]
     parts: Annotated[int | None, Field(description="Parts cut and not measured; null: nothing tells of them.")]

@@ -96,6 +96,7 @@ def test_acknowledging_does_not_raise_it_again(shop: Shop, other: str) -> None:
 
 def test_every_part_after_an_alarm_and_after_a_tool_change(shop: Shop, other: str) -> None:
     plan(shop, every=50, after_alarm=2, after_change=1)
+    assert due(shop)["tightened"] is None, "the tool was never changed"
     shop.push([0.1, 0.1])
     assert (due(shop)["every"], due(shop)["tightened"]) == (50, None)
     shop.read(9.0)
@@ -110,6 +111,65 @@ def test_every_part_after_an_alarm_and_after_a_tool_change(shop: Shop, other: st
     assert due(shop)["tightened"] == "tool_change"
     shop.read(0.1)
     assert due(shop)["tightened"] is None
+
+
+def test_parts_that_were_cut_before_the_tool_change_are_judged_by_the_plan(shop: Shop, other: str) -> None:
+    plan(shop, every=10, after_change=3)
+    shop.read(0.1, part="A1")
+    cut(shop, other, "A2", "A3", "A4", "A5", "A6")
+    shop.call("POST", f"/machines/{shop.machine}/tools/3/change", offset=0.0, reason="worn")
+    cut(shop, other, "A7")
+    assert (due(shop)["due"], due(shop)["parts"], look(shop)) == ("due", 5, [])
+    cut(shop, other, "A8")
+    (alarm,) = look(shop)
+    assert (alarm["kind"], missed(shop)[0]["every"]) == ("measurement_missed", 1)
+
+
+def test_what_happens_to_the_tool_counts_by_its_time(shop: Shop, other: str) -> None:
+    """Numbers of readings move with an import, and those of another characteristic are none of this one."""
+    plan(shop, every=50, after_alarm=2, after_change=1)
+    shop.push([0.1] * 5)
+    shop.call("POST", f"/machines/{shop.machine}/tools/3/change", offset=0.0, reason="worn")
+    with psycopg.connect(shop.server.database.dsn) as connection:
+        connection.execute("UPDATE stream SET sequence_at_tool_change = sequence_at_tool_change + 7")
+    assert due(shop)["tightened"] == "tool_change"
+    shop.read(0.1)
+    assert due(shop)["tightened"] is None
+    with psycopg.connect(shop.server.database.dsn) as connection:
+        connection.execute(
+            "INSERT INTO alarm (machine_id, kind, tool_memory, sequence, last_sequence)"
+            " SELECT id, 'offset_limit', 3, 1, 1 FROM machine WHERE key = %s",
+            (shop.machine,),
+        )
+    assert due(shop)["tightened"] == "alarm"
+
+
+def test_a_reading_that_comes_late_is_neither_the_newest_nor_the_end_of_a_gap(shop: Shop, other: str) -> None:
+    plan(shop, every=1)
+    with psycopg.connect(shop.server.database.dsn) as connection:
+        connection.execute("UPDATE control_plan SET since = now() - interval '2 days'")
+    begin = datetime.now(UTC) - timedelta(hours=1)
+
+    def at(*minutes: int) -> list[str]:
+        return [(begin + timedelta(minutes=each)).isoformat() for each in minutes]
+
+    shop.push([0.1] * 4, other, part=["A1", "A2", "A3", "A4"], measured_at=at(1, 2, 3, 4))
+    shop.push([0.1] * 3, part=["A1", "A2", "A3"], measured_at=at(1, 2, 3))
+    assert look(shop) == []
+    shop.read(0.1, part="A0", measured_at=at(0)[0])
+    assert (due(shop)["due"], due(shop)["last_sequence"], look(shop)) == ("due", 3, [])
+    shop.read(0.1, part="A4", measured_at=at(4)[0])
+    assert (look(shop), missed(shop)) == ([], [])
+
+
+def test_numbers_from_before_the_plan_are_not_missed(shop: Shop, other: str) -> None:
+    shop.read(0.1, part="N1")
+    cut(shop, other, "N2", "N9")
+    plan(shop, every=2, numbered=True)
+    cut(shop, other, "N10")
+    assert (due(shop)["parts"], look(shop)) == (0, [])
+    cut(shop, other, "N13")
+    assert due(shop)["parts"] == 1, "numbers count from a reading under the plan on"
 
 
 def test_by_minutes_and_by_shift_while_the_part_is_made(shop: Shop, other: str) -> None:
