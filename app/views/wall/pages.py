@@ -65,7 +65,7 @@ class WallDoor:
         self._alone = Lock()
 
     def wall(self, session: Session) -> Wall:
-        """What is shown now. One look asks the database; those that come meanwhile wait for it and show the same."""
+        """Return what is shown now. One look asks the database; those that come meanwhile wait for it and show the same."""
         with self._alone:
             if self._shown is None or time.monotonic() - self._shown[0] >= LASTS:
                 wall = queries.wall(session)
