@@ -12,13 +12,12 @@ from app.core.reaction import Handled, Share, pareto
 from app.db.period import in_period
 from app.errors import NotFound
 from app.language.i18n import _
+from app.loop.alarms import endings
 from app.loop.tables.alarms import Alarm
 from app.loop.tables.reactions import CatalogueEntry, ReactionPlan
 from app.loop.tables.readings import Reading
 
 MOST_ALARMS = 5_000
-ENDED_BY_ITSELF = "inband"
-"""Who acknowledges alarms that end by themselves: they have no cause that anybody was asked for."""
 
 
 def plan(session: Session, number: int, version: int | None = None) -> ReactionPlan:
@@ -83,7 +82,7 @@ def causes_of_alarms(
 ) -> Pareto:
     """Acknowledged alarms that were raised in the period, the newest `MOST_ALARMS` of them, by cause. which: conditions besides.
 
-    One that a person has not acknowledged, because it ended by itself, has no cause and is not counted.
+    One that ended by itself has no cause that anybody was asked for, and is not counted.
     """
     recovered = (
         select(Reading.received_at)
@@ -99,7 +98,7 @@ def causes_of_alarms(
     )
     query = select(Alarm.cause, Alarm.raised_at, Alarm.acknowledged_at, recovered).where(
         Alarm.acknowledged_at.is_not(None),
-        Alarm.acknowledged_by != ENDED_BY_ITSELF,
+        ~endings.is_by_itself(),
         in_period(Alarm.raised_at, period),
         *which,
     )

@@ -20,6 +20,7 @@ from app.language.i18n import _
 from app.language.times import begin_of_shift, end_of_shift
 from app.loop.alarm_response import queries as responses
 from app.loop.alarm_response.queries import AlarmRow
+from app.loop.alarms import endings
 from app.loop.machines.queries import machine_named, machines
 from app.loop.tables.alarms import Alarm
 from app.loop.tables.characteristics import Characteristic
@@ -27,8 +28,6 @@ from app.loop.tables.machines import Machine
 from app.quality.wear.queries import NEAR
 from app.views.overview.queries import Ranked, ranking
 
-OWN = "inband"
-"""By whom an alarm is acknowledged that ended by itself."""
 MOST_ALARMS = 1000
 MOST_NEXT = 50
 MOST_MACHINES = 100_000
@@ -77,17 +76,22 @@ JOIN stream s ON s.machine_id = v.machine_id AND s.characteristic_id = v.charact
 WHERE s.sequence > 0 AND (CAST(:machine AS int) IS NULL OR v.machine_id = :machine)
 """
 
-_ALARMS = f"""
+_ALARMS = """
+WITH raised AS (
+    SELECT machine_id, acknowledged_at - raised_at AS after, acknowledged_at IS NULL AS active,
+        coalesce(outcome -> 0 ->> 'code' = ANY(CAST(:endings AS text[])), false) AS by_itself
+    FROM alarm
+    WHERE raised_at >= :start AND raised_at < :end AND (CAST(:machine AS int) IS NULL OR machine_id = :machine)
+)
 SELECT machine_id, count(*) AS alarms,
-    count(*) FILTER (WHERE acknowledged_by <> '{OWN}') AS acknowledged,
-    count(*) FILTER (WHERE acknowledged_by = '{OWN}') AS by_itself,
-    count(*) FILTER (WHERE acknowledged_at IS NULL) AS active,
-    percentile_cont(0.5) WITHIN GROUP (ORDER BY acknowledged_at - raised_at) FILTER (WHERE acknowledged_by <> '{OWN}') AS median,
-    max(acknowledged_at - raised_at) FILTER (WHERE acknowledged_by <> '{OWN}') AS longest
-FROM alarm
-WHERE raised_at >= :start AND raised_at < :end AND (CAST(:machine AS int) IS NULL OR machine_id = :machine)
+    count(*) FILTER (WHERE NOT active AND NOT by_itself) AS acknowledged,
+    count(*) FILTER (WHERE by_itself) AS by_itself,
+    count(*) FILTER (WHERE active) AS active,
+    percentile_cont(0.5) WITHIN GROUP (ORDER BY after) FILTER (WHERE NOT by_itself) AS median,
+    max(after) FILTER (WHERE NOT by_itself) AS longest
+FROM raised
 GROUP BY GROUPING SETS ((machine_id), ())
-"""  # noqa: S608 - made of our own name
+"""
 
 _CHANGES = """
 SELECT machine_id, count(*) AS changes FROM tool_event
@@ -173,7 +177,7 @@ class Raised(NamedTuple):
     @property
     def by_itself(self) -> bool:
         """Tell if it ended without a person."""
-        return self.alarm.acknowledged_by == OWN
+        return endings.by_itself(self.alarm)
 
 
 class Next(NamedTuple):
@@ -262,7 +266,7 @@ def made_in(session: Session, period: Period, machine_id: int | None = None) -> 
 
 
 def _answered(session: Session, where: dict[str, Any]) -> dict[int | None, Answered]:
-    rows = session.execute(text(_ALARMS), where).mappings()
+    rows = session.execute(text(_ALARMS), where | {"endings": endings.codes()}).mappings()
     return {row["machine_id"]: Answered(**{field.name: row[field.name] for field in fields(Answered)}) for row in rows}
 
 

@@ -136,6 +136,18 @@ def test_causes_are_counted_with_their_times(shop: Shop) -> None:
     assert name in text
 
 
+def test_an_alarm_that_the_machine_ends_is_none_without_a_cause(shop: Shop) -> None:
+    path, where = f"/machines/{shop.machine}/faults", f"/reactions/causes?machine={shop.machine}"
+    shop.call("POST", path, 201, client=shop.machine_client, kind="battery_low")
+    shop.call("POST", path, client=shop.machine_client, kind="battery_low", active=False)
+    [ended] = shop.alarms("acknowledged")
+    assert ended["acknowledged_by"] != "inband"
+    assert shop.call("GET", where)["causes"] == []
+    shop.call("POST", path, 201, client=shop.machine_client, kind="battery_low")
+    shop.acknowledge(shop.alarms()[-1]["id"], "noted")
+    assert [share["alarms"] for share in shop.call("GET", where)["causes"]] == [1], "a person answered this one"
+
+
 def test_those_whom_a_plan_names_are_notified_of_its_alarms_alone(shop: Shop) -> None:
     receiver = shop.call(
         "POST", "/notifications/receivers", 201, name=unique("Anna"), means="mail", address="anna@example.com"

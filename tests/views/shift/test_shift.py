@@ -33,15 +33,22 @@ def ran(common_shop: Shop, server: Server) -> Shop:
         named = {"part": part} if part else {}
         shop.read(micrometres, characteristic, measured_at=LONG_AGO.format(minute), **named)
     with server.database.begin() as session:  # the alarms of then, answered after 1, 3 and 10 minutes and by itself
-        for number, (minutes, by) in enumerate([(1, "ana"), (3, "ben"), (10, "ana"), (600, "inband"), (None, None)]):
+        for number, (minutes, by) in enumerate([(1, "ana"), (3, "ben"), (10, "ana"), (600, "bridge"), (None, None)]):
             at = datetime(2026, 3, 5, 7, number, tzinfo=UTC)
             ended = None if minutes is None else at + timedelta(minutes=minutes)
             session.execute(
                 text("""
-                INSERT INTO alarm (machine_id, tool_memory, kind, raised_at, acknowledged_at, acknowledged_by)
-                SELECT id, :tool, 'hunting', :at, :ended, :by FROM machine WHERE key = :key
+                INSERT INTO alarm (machine_id, tool_memory, kind, raised_at, acknowledged_at, acknowledged_by, outcome)
+                SELECT id, :tool, 'hunting', :at, :ended, :by, CAST(:outcome AS jsonb) FROM machine WHERE key = :key
                 """),
-                {"tool": number + 1, "at": at, "ended": ended, "by": by, "key": shop.machine},
+                {
+                    "tool": number + 1,
+                    "at": at,
+                    "ended": ended,
+                    "by": by,
+                    "outcome": {"bridge": '[{"code": "fault_over"}]', "ana": "[]"}.get(by or ""),
+                    "key": shop.machine,
+                },
             )
     return shop
 
