@@ -3,8 +3,11 @@
 Of n parts one is measured. Part j after it (j = 1 … n - 1) is not measured, and the offset follows none of them, so the mean drifts
 away by wear, taken towards the nearer limit. The share of all parts that are out of tolerance and go out unmeasured is::
 
-    risk(n) = 1/n Σ P(out | mean ± j w, σ)  +  r (n - 1) / 2
+    risk(n) = 1/n Σ P(out | mean ± (j + (k - 1) (n - 1)) w, σ)  +  r (n - 1) / 2
 
+k: the weighting factor R29. A correction by the running average removes about 1/k of the deviation, so the offset stays behind the wear
+by (k - 1) parts where every part is measured, which the mean has already, and by (k - 1) n where 1 in n is. Deviations beyond R34
+are corrected in full and stay behind by less: the risk errs to the safe side.
 P: the normal distribution, the worse of the two signs. w: wear per part, the upper end of its interval. r: sudden events per part (a
 chipped edge, a slipped part), after which on average (n - 1) / 2 parts go out before the next measurement (Duncan 1956, J. Am.
 Stat. Assoc. 51, 228: the process shifts at random between two samples). Of k events in N readings r = (k + 1/2) / (N + 1), the
@@ -56,6 +59,7 @@ class Process(NamedTuple):
     stable: bool | None
     signals: int
     index_low: float | None
+    weighting: float = 1.0
 
 
 class Risk(NamedTuple):
@@ -91,13 +95,16 @@ def hindrances(process: Process) -> tuple[Hindrance, ...]:
 
 
 def risk(process: Process, every: int) -> float:
-    """Parts per million that go out of tolerance unmeasured; it never falls where fewer parts are measured.
+    """Parts per million that go out of tolerance unmeasured; it never falls where fewer parts are measured, nor with R29.
 
     >>> process = Process(Limits(-6.0, 6.0), 0.0, 1.0, 0.1, 10_000, 0, True, 0, 1.9)
     >>> [round(risk(process, every), 1) for every in (1, 2, 10, 50)]
     [0.0, 25.0, 225.0, 16341.7]
+    >>> round(risk(process._replace(weighting=3.0), 10), 1)
+    374.2
     """
-    drift = (process.wear or 0.0) * np.arange(1, every, dtype=np.float64)
+    behind = (process.weighting - 1) * (every - 1)
+    drift = (process.wear or 0.0) * (np.arange(1, every, dtype=np.float64) + behind)
     sudden = (process.jumps + 0.5) / (process.readings + 1)
     drifting = float(np.maximum(_out(process, drift), _out(process, -drift)).sum()) / every
     return min(1.0, drifting + sudden * (every - 1) / 2) * 1e6

@@ -5,6 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from app.core.decision.step import average_of
 from app.core.sampling import CHOICES, Hindrance, Process, proposal, risk, saved
 from app.core.spc.capability import Limits
 
@@ -20,6 +21,7 @@ processes = st.builds(
     st.sampled_from([True, False, None]),
     st.integers(0, 3),
     st.none() | st.floats(0, 4),
+    st.floats(1, 20),
 )
 
 
@@ -27,6 +29,27 @@ processes = st.builds(
 def test_the_risk_never_falls_where_fewer_parts_are_measured(process: Process, every: int) -> None:
     assert 0 <= risk(process, every) <= risk(process, every + 1) + 1e-6
     assert risk(process, 1) == 0
+
+
+@given(processes, st.integers(1, 120), st.floats(1, 20))
+def test_the_risk_never_falls_with_the_weighting_of_the_average(process: Process, every: int, more: float) -> None:
+    slower = process._replace(weighting=process.weighting * more)
+    assert risk(process, every) <= risk(slower, every) + 1e-6
+    assert risk(slower, 1) == 0
+
+
+@pytest.mark.parametrize(("k", "every"), [(1, 10), (4, 1), (4, 2), (8, 10)])
+def test_the_offset_stays_behind_the_wear_as_far_as_decisions_let_it(k: int, every: int) -> None:
+    """One cycle of the loop itself, long after its begin: parts wear by 1, the average corrects by all that it holds."""
+    size = 0.0
+    for _measured in range(300):
+        size -= average_of(0.0, size, k)
+        unmeasured = [size + part for part in range(1, every)]
+        size += every
+    behind = (k - 1) * (every - 1)
+    assert unmeasured == pytest.approx(
+        [part + behind + (k - 1) for part in range(1, every)]
+    )  # (k - 1): the mean has it
 
 
 @given(processes, st.floats(0, 1e6))

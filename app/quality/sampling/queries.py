@@ -51,6 +51,7 @@ def sampling_of(
         judged.stable,
         signals.counts(session, current.characteristic)["open"],
         judged.quoting.low,
+        current.parameters.weighting_factor,
     )
     every = plans.stated(plans.plan_of(session, current)).every
     return Sampling(current, process, proposal(process, most_ppm), most_ppm, every)

@@ -2,6 +2,8 @@
 
 from typing import Any
 
+from app.loop.characteristics.queries import characteristic_named
+from app.quality.sampling.queries import Sampling, sampling_of
 from tests.quality.closed_loop import scatter
 from tests.shop import Person, Shop
 
@@ -32,3 +34,14 @@ def test_it_is_proposed_from_the_stored_readings(shop: Shop) -> None:
     assert now["jumps"] == 1
     assert {"unstable", "not_capable"} & set(now["hindrances"])
     assert "Measure every part" in viewer.open(f"{here}?most_ppm=20000")
+
+
+def test_the_weighting_of_the_running_average_counts(shop: Shop) -> None:
+    slow = shop.another("slow", weighting_factor=4)
+    shop.push([value * 0.4 for value in scatter(300, wear=0.0)], slow)
+    with shop.server.database.begin() as session:
+        found = sampling_of(session, characteristic_named(session, slow))
+    assert isinstance(found, Sampling)
+    assert found.process.weighting == 4
+    page = Person(shop.server, "viewer").open(f"/characteristics/{slow}/sampling")
+    assert "R29 = 4.0" in page
