@@ -16,6 +16,7 @@ from app.web.etags import TAGGED, guarded, tagged
 from app.web.fields import Page, Slug, page_of
 
 router = api_router("characteristics")
+Few = Annotated[int, Query(ge=1, le=100, description="How many items at most: each is looked at now.")]
 
 
 @router.get("/characteristics/{characteristic}/control-plan", responses=problems(404) | TAGGED)
@@ -39,12 +40,13 @@ def set_control_plan(
 
 @router.get("/due-measurements", responses=problems(404))
 def list_due_measurements(
-    session: SessionDep, caller: AnyCaller, machine: MachineFilter = None, after: KeyAfter = "", limit: Limit = 100
+    session: SessionDep, caller: AnyCaller, machine: MachineFilter = None, after: KeyAfter = "", limit: Few = 100
 ) -> Page[DueOut]:
     """Every characteristic with a control plan, by key: which measurement is due, and which was missed.
 
-    Parts that are not measured are known by readings of other characteristics of the same part, and by numbers of parts where the plan
-    says that they are numbered one by one; where nothing tells of them, `parts` is null.
+    Parts that are not measured are known by readings of other characteristics with the same `part`, and by numbers of parts where the
+    plan says that they are numbered one by one. Where nothing tells of them `parts` is null, and not known is not missed: so it is for
+    a characteristic without a `part`.
     """
     rows = queries.planned(session, machine_id=only_machine(session, caller, machine), after=after, limit=limit + 1)
     items = [DueOut.of(where.key, at.key, queries.look(session, plan)) for plan, where, at in rows]

@@ -17,29 +17,20 @@ from app.core.control_plan import (
     Plan,
     Ran,
     Rhythm,
-    Tightened,
     in_time,
     judged,
     ran,
     rhythm,
 )
-from app.core.decision.step import Code
 from app.core.period import ALWAYS, Period
 from app.db.period import in_period
-from app.language.times import begin_of_shift
 from app.loop.characteristics.queries import CurrentCharacteristic
-from app.loop.control_plan.alarm_kinds import MISSED
+from app.loop.control_plan import signs
 from app.loop.control_plan.tables import ControlPlan, MissedMeasurement
-from app.loop.tables.alarms import Alarm
-from app.loop.tables.characteristics import Characteristic, ParametersVersion
+from app.loop.tables.characteristics import Characteristic
 from app.loop.tables.machines import Machine
-from app.loop.tables.readings import Reading, Stream
-from app.loop.tables.tools import Tool
+from app.loop.tables.readings import Stream
 
-MOST = 1_500
-"""Readings of each characteristic that are looked at, the newest."""
-FURTHEST = 5_000
-"""Readings in which those of the characteristic itself are looked for: an import may have brought more."""
 LATELY = timedelta(days=30)
 """As far back as pages count."""
 
@@ -57,7 +48,7 @@ class Look(NamedTuple):
     """A plan as it is kept now. late: closed intervals in which it was not kept, of the readings since the last look.
 
     sequence: the last reading in time. seen: the last one that came. since: all that is known of the time after it. open: the
-    missed measurement that is open.
+    missed measurement that is open. of_part: it is stated of which part the characteristic is.
     """
 
     row: ControlPlan
@@ -68,6 +59,7 @@ class Look(NamedTuple):
     judged: Judged
     late: list[Interval]
     open: MissedMeasurement | None
+    of_part: bool
 
 
 class MissedRow(NamedTuple):
@@ -114,18 +106,19 @@ def look(session: Session, row: ControlPlan, now: datetime | None = None) -> Loo
     """Look at a plan: what was missed since the last look, and what is due now."""
     now = now or datetime.now(UTC)
     plan, stream = row.plan, session.get_one(Stream, (row.machine_id, row.characteristic_id), populate_existing=True)
-    own = _own(session, row, stream)
+    own = signs.own_readings(session, row, stream)
     begin = _begin(row, stream, own, now)
     moments = in_time(((each.sequence, each.moment) for each in own if each.sequence > row.seen), begin)
-    moments = [(sequence, moment._replace(shift=_shift(moment.at))) for sequence, moment in moments]
-    others = _others(session, row, moments[0][1].at)
+    moments = [(sequence, moment._replace(shift=signs.shift_of(moment.at))) for sequence, moment in moments]
+    characteristic = session.get_one(Characteristic, (row.machine_id, row.characteristic_id))
+    others = signs.other_readings(session, row, characteristic, moments[0][1].at)
     times = [each.at for each in others]
     measured = frozenset(each.moment.part for each in own if each.moment.part is not None)
-    events = _events(session, row, stream, own)
+    happened = signs.events(session, row, stream, own)
 
     def in_force(sequence: int) -> Rhythm:
         come = bisect_right(own, sequence, key=lambda each: each.sequence)
-        return rhythm(plan, (Event(why, at, max(0, come - before)) for why, at, before in events))
+        return rhythm(plan, (Event(why, at, max(0, come - before)) for why, at, before in happened))
 
     late = []
     for (after, last), (until, this) in pairwise(moments):
@@ -136,50 +129,21 @@ def look(session: Session, row: ControlPlan, now: datetime | None = None) -> Loo
         if verdict.due is Due.MISSED:
             late.append(Interval(after, until, passed, verdict))
     sequence, last = moments[-1]
-    here = Moment(now.timestamp(), 0, None, _shift(now.timestamp()))
+    here = Moment(now.timestamp(), 0, None, signs.shift_of(now.timestamp()))
     force = in_force(max(sequence, row.seen, *(each.sequence for each in own[-1:])))
     since = ran(plan, last, others[bisect_right(times, last.at) :], now=here, measured=measured, event=force.at)
     verdict = judged(plan, force, since, in_this_shift=bool(sequence) and last.shift >= here.shift)
     seen = max(row.seen, stream.sequence, *(each.sequence for each in own[-1:]))
-    return Look(row, sequence, seen, force, since, verdict, late, open_of(session, row))
-
-
-def _shift(at: float) -> float:
-    return begin_of_shift(datetime.fromtimestamp(at, UTC)).timestamp()
-
-
-class _Own(NamedTuple):
-    """A reading of the characteristic itself. received: when it came, seconds."""
-
-    sequence: int
-    received: float
-    moment: Moment
-
-
-def _own(session: Session, row: ControlPlan, stream: Stream) -> list[_Own]:
-    """The newest readings of the characteristic, in the order in which they came. None was measured after it came."""
-    newest = (
-        select(Reading.sequence, Reading.received_at, Reading.measured_at, Reading.part)
-        .where(
-            Reading.machine_id == row.machine_id,
-            Reading.characteristic_id == row.characteristic_id,
-            Reading.sequence > stream.sequence - FURTHEST,
-            Reading.code != Code.IMPORTED,
-        )
-        .order_by(Reading.sequence.desc())
-        .limit(MOST)
+    return Look(
+        row, sequence, seen, force, since, verdict, late, open_of(session, row), characteristic.part is not None
     )
-    return [
-        _Own(sequence, received.timestamp(), Moment(min(at, received).timestamp(), row.characteristic_id, part))
-        for sequence, received, at, part in reversed(session.execute(newest).all())
-    ]
 
 
-def _begin(row: ControlPlan, stream: Stream, own: Sequence[_Own], now: datetime) -> tuple[int, Moment]:
+def _begin(row: ControlPlan, stream: Stream, own: Sequence[signs.Own], now: datetime) -> tuple[int, Moment]:
     """The last reading in time of those that were looked at before, not before the plan: what was cut under another is no matter."""
     before = [each for each in own if each.sequence <= row.seen]
     since = Moment(row.since.timestamp(), row.characteristic_id)
-    if not before and own and (len(own) == MOST or stream.sequence > FURTHEST):
+    if not before and own and (len(own) == signs.MOST or stream.sequence > signs.FURTHEST):
         before = [own[0]]
     if before:
         newest = max(before, key=lambda each: each.moment.at)
@@ -187,90 +151,6 @@ def _begin(row: ControlPlan, stream: Stream, own: Sequence[_Own], now: datetime)
     if not own and stream.last_measured_at is not None:
         since = since._replace(at=max(since.at, min(stream.last_measured_at, now).timestamp()))
     return row.seen, since
-
-
-def _others(session: Session, row: ControlPlan, since: float) -> list[Moment]:
-    """Readings of the other characteristics of the same part, by time. Those of its form are made of its own."""
-    own = session.get_one(Characteristic, (row.machine_id, row.characteristic_id))
-    moment = datetime.fromtimestamp(since, UTC)
-    query = (
-        select(Reading.characteristic_id, Reading.part, func.least(Reading.measured_at, Reading.received_at))
-        .join(
-            Stream,
-            (Stream.machine_id == Reading.machine_id) & (Stream.characteristic_id == Reading.characteristic_id),
-        )
-        .join(
-            Characteristic,
-            (Characteristic.machine_id == Stream.machine_id) & (Characteristic.id == Stream.characteristic_id),
-        )
-        .where(
-            Reading.machine_id == row.machine_id,
-            Stream.machine_id == row.machine_id,
-            Characteristic.machine_id == row.machine_id,
-            Characteristic.id != own.id,
-            Characteristic.part.is_not_distinct_from(own.part),
-            Characteristic.form_of.is_distinct_from(own.id),
-            Stream.last_measured_at > moment,
-            Reading.sequence > Stream.sequence - MOST,
-            Reading.measured_at > moment,
-            Reading.code != Code.IMPORTED,
-        )
-    )
-    found = [
-        Moment(at.timestamp(), source, part, _shift(at.timestamp())) for source, part, at in session.execute(query)
-    ]
-    return sorted(found, key=lambda each: each.at)
-
-
-def _events(
-    session: Session, row: ControlPlan, stream: Stream, own: Sequence[_Own]
-) -> list[tuple[Tightened, float, int]]:
-    """The last tool change and the alarms about the characteristic or its tool, by time. Last: how many of `own` came before."""
-
-    def come(at: datetime) -> int:
-        return bisect_right(own, at.timestamp(), key=lambda each: each.received)
-
-    found = []
-    changed = _changed_at(session, row, stream) if row.after_change else None
-    if changed is not None:
-        found.append((Tightened.TOOL_CHANGE, changed.timestamp(), come(changed)))
-    if row.after_alarm:
-        about = Alarm.characteristic_id == row.characteristic_id
-        if stream.tool_memory:
-            about = or_(about, and_(Alarm.characteristic_id.is_(None), Alarm.tool_memory == stream.tool_memory))
-        alarms = session.execute(
-            select(Alarm.characteristic_id, func.coalesce(Alarm.last_sequence, Alarm.sequence), Alarm.last_at)
-            .where(Alarm.machine_id == row.machine_id, about, Alarm.kind != MISSED.name)
-            .order_by(Alarm.id.desc())
-            .limit(100)
-        )
-        for of, sequence, at in alarms:
-            by_reading = of is not None and sequence is not None  # else the number is one of another characteristic
-            before = bisect_right(own, sequence, key=lambda each: each.sequence) if by_reading else come(at)
-            found.append((Tightened.ALARM, at.timestamp(), before))
-    if stream.sequence > FURTHEST and len(own) < MOST:  # more was read since than is known here
-        found = [event for event in found if event[2]]
-    return found
-
-
-def _changed_at(session: Session, row: ControlPlan, stream: Stream) -> datetime | None:
-    """The moment at which the tool was changed, or the characteristic given to this tool; None: never."""
-    tool = session.scalar(
-        select(Tool.changed_at).where(Tool.machine_id == row.machine_id, Tool.number == stream.tool_memory)
-    )
-    versions = (
-        ParametersVersion.machine_id == row.machine_id,
-        ParametersVersion.characteristic_id == row.characteristic_id,
-    )
-    another = (
-        select(func.max(ParametersVersion.version))
-        .where(*versions, ParametersVersion.parameters["tool_memory"].as_integer() != stream.tool_memory)
-        .scalar_subquery()
-    )
-    given = session.scalar(
-        select(func.min(ParametersVersion.created_at)).where(*versions, ParametersVersion.version > another)
-    )
-    return max((at for at in (tool, given) if at is not None), default=None)
 
 
 def open_of(session: Session, row: ControlPlan) -> MissedMeasurement | None:

@@ -100,7 +100,10 @@ class DueOut(BaseModel):
     def of(cls, characteristic: str, machine: str, look: Look) -> Self:
         """A plan as it is kept now."""
         plan = look.row.plan
-        sentences = [f"{due_word(look.judged.due)}.", *state_sentences(plan, look.rhythm, look.since, look.judged)]
+        sentences = [
+            f"{due_word(look.judged.due)}.",
+            *state_sentences(plan, look.rhythm, look.since, look.judged, of_part=look.of_part),
+        ]
         return cls(
             characteristic=characteristic,
             machine=machine,

@@ -54,7 +54,7 @@ def rule_word(by: str) -> str:
     return {By.PARTS: _("parts"), By.MINUTES: _("minutes"), By.SHIFT: _("shift")}[By(by)]
 
 
-def state_sentences(plan: Plan, rhythm: Rhythm, since: Ran, judged: Judged) -> list[str]:
+def state_sentences(plan: Plan, rhythm: Rhythm, since: Ran, judged: Judged, *, of_part: bool) -> list[str]:
     """State the measurement that is due, why, and the parts that are known not to be measured."""
     sentences = []
     if rhythm.tightened is Tightened.ALARM:
@@ -70,6 +70,13 @@ def state_sentences(plan: Plan, rhythm: Rhythm, since: Ran, judged: Judged) -> l
                 "{n} parts were cut since the last reading and not measured.",
                 since.parts,
             ).format(n=since.parts)
+        )
+    elif not of_part:
+        sentences.append(
+            _(
+                "Parts that are not measured are not known: the characteristic has no part. State it in Set-up, for this one and "
+                "for the others of the same part."
+            )
         )
     elif plan.asks:
         sentences.append(

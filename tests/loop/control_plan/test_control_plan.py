@@ -8,7 +8,7 @@ import psycopg
 import pytest
 
 from app.jobs.actions import run_jobs
-from app.loop.control_plan import actions, jobs
+from app.loop.control_plan import actions, jobs, signs
 from tests.conftest import Server
 from tests.shop import Person, Shop
 
@@ -18,7 +18,14 @@ WHY = "Agreed with quality"
 @pytest.fixture
 def other(shop: Shop) -> str:
     """Another characteristic of the same part, which is measured at every part."""
-    return shop.another("face", tool_memory=7, average_memory=7)
+    return face_of(shop)
+
+
+def face_of(shop: Shop) -> str:
+    face = shop.another("face", tool_memory=7, average_memory=7)
+    for key in (shop.characteristic, face):
+        shop.call("PATCH", f"/characteristics/{key}", part="shaft-0815")
+    return face
 
 
 def plan(shop: Shop, status: int = 200, **rules: Any) -> Any:
@@ -203,11 +210,41 @@ def test_of_parts_that_nothing_tells_of_none_is_missed(shop: Shop, other: str) -
     assert look(shop) == [], "the machine makes another part now"
 
 
+def test_without_a_part_nobody_knows_which_characteristics_are_of_one(shop: Shop, other: str) -> None:
+    """Two workpieces on one machine, of which nobody has stated the names, are not taken for one."""
+    plan(shop, every=1)
+    for key in (shop.characteristic, other):
+        shop.call("PATCH", f"/characteristics/{key}", part=None)
+    cut(shop, other, "A1", "A2", "A3")
+    shop.push([0.1] * 3, other)
+    assert (due(shop)["parts"], look(shop)) == (None, [])
+    assert "State it in Set-up" in due(shop)["text"]
+    plan(shop, every=1, numbered=True)
+    shop.push([0.1] * 3, other)
+    shop.read(0.1, part="A4")
+    cut(shop, other, "A5", "A6")
+    assert due(shop)["parts"] == 1, "numbers of the machine tell"
+
+
+def test_no_more_is_read_than_is_needed(shop: Shop, other: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(signs, "FEW", 2)
+    plan(shop, every=1)
+    cut(shop, other, "A1", "A2", "A3", "A4", "A5", "A6")
+    look(shop)
+    assert missed(shop)[0]["parts"] == 5, "more than the newest few where all of these are since"
+    monkeypatch.setattr(signs, "FURTHEST", 2)  # as if an import had brought the rest
+    for part in ("A6", "A7", "A8"):
+        shop.read(0.1, part=part)
+    cut(shop, other, "A8")
+    assert look(shop) == []
+    assert len(missed(shop)) == 1
+
+
 def test_one_that_fails_stops_no_other(shop: Shop, other: str, server: Server, monkeypatch: pytest.MonkeyPatch) -> None:
     plan(shop, every=1)
     neighbour = Shop(server)
     plan(neighbour, every=1)
-    cut(neighbour, neighbour.another("face"), "A1", "A2")
+    cut(neighbour, face_of(neighbour), "A1", "A2")
     cut(shop, other, "A1", "A2")
 
     def fails(session: Any, machine_id: int, characteristic_id: int) -> None:
