@@ -46,6 +46,7 @@ _ROWS = (
 _LIKE_LETTERS = str.maketrans("0134578@$!|", "oieastbasii")
 
 _hashing = PasswordHash.recommended()
+_code_cost = 2**15  # n of scrypt: 32 MB and a tenth of a second for each code that is tried
 # Argon2 takes 64 MB for each: a crowd at the door must not exhaust the memory that readings need.
 _at_once = threading.BoundedSemaphore(2)
 
@@ -67,7 +68,7 @@ def looked_up(code: str) -> bytes:
     """Stored form of a code by which its owner is found: the same for the same code, and slow to compute for all that are tried."""
     with _at_once:
         return hashlib.scrypt(
-            code.encode("utf-8", "surrogatepass"), salt=b"inband badge", n=2**15, r=8, p=1, maxmem=2**26, dklen=32
+            code.encode("utf-8", "surrogatepass"), salt=b"inband badge", n=_code_cost, r=8, p=1, maxmem=2**26, dklen=32
         )
 
 

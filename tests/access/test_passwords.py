@@ -66,9 +66,13 @@ def test_these_tests_have_a_cheap_one() -> None:
 
 def test_a_program_has_the_recommended_cost_in_the_environment_of_the_tests() -> None:
     program = (
-        "from app.access.passwords import hashed, matches\n"
+        "import hashlib\n"
+        "from app.access.passwords import hashed, looked_up, matches\n"
+        "real, costs = hashlib.scrypt, []\n"
+        "hashlib.scrypt = lambda *words, **cost: costs.append(cost['n'] * cost['r']) or real(*words, **cost)\n"
+        "looked_up('badge')\n"
         f"made = hashed({PASSWORD!r})\n"
-        f"print(made, matches({PASSWORD!r}, made))"
+        f"print(made, matches({PASSWORD!r}, made), *costs)"
     )
     done = subprocess.run(
         [sys.executable, "-c", program],
@@ -78,7 +82,8 @@ def test_a_program_has_the_recommended_cost_in_the_environment_of_the_tests() ->
         text=True,
         check=True,
     )
-    made, right = done.stdout.split()
+    made, right, cost = done.stdout.split()
+    assert int(cost) >= 2**15 * 8, "of a code, such as a badge"
     assert Cost.of(made) == Cost.of(PasswordHash.recommended().hash(PASSWORD))
     assert right == "True"
 
@@ -92,10 +97,13 @@ def test_nothing_in_the_program_sets_another_cost() -> None:
     imported |= {node.module or "" for node in nodes if isinstance(node, ast.ImportFrom)}
     assert not imported & {"os", "sys", "builtins", "importlib", "app.settings"}
     stored = [node for node in nodes if isinstance(node, ast.Name) and isinstance(node.ctx, ast.Store)]
-    assert [node.id for node in stored].count("_hashing") == 1
-    assert "\n_hashing = PasswordHash.recommended()\n" in own.read_text()
+    names = [node.id for node in stored]
+    assert (names.count("_hashing"), names.count("_code_cost")) == (1, 1)
+    assert "\n_hashing = PasswordHash.recommended()\n_code_cost = 2**15 " in own.read_text()
     others = [file for file in (HOUSE / "app").rglob("*.py") if file != own]
-    assert [file.name for file in others if re.search(r"pwdlib|argon2|passwords\._|_hashing", file.read_text())] == []
+    assert [
+        file.name for file in others if re.search(r"pwdlib|argon2|passwords\._|_hashing|_code_cost", file.read_text())
+    ] == []
 
 
 def test_a_server_that_runs_as_a_program_has_it_and_people_sign_in(
