@@ -12,7 +12,7 @@ from app.core.reaction import Handled, Share, pareto
 from app.db.period import in_period
 from app.errors import NotFound
 from app.language.i18n import _
-from app.loop.alarms import endings
+from app.loop.alarms import ended_queries as endings
 from app.loop.tables.alarms import Alarm
 from app.loop.tables.reactions import CatalogueEntry, ReactionPlan
 from app.loop.tables.readings import Reading

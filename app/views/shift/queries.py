@@ -20,7 +20,7 @@ from app.language.i18n import _
 from app.language.times import begin_of_shift, end_of_shift
 from app.loop.alarm_response import queries as responses
 from app.loop.alarm_response.queries import AlarmRow
-from app.loop.alarms import endings
+from app.loop.alarms import ended_queries as endings
 from app.loop.machines.queries import machine_named, machines
 from app.loop.tables.alarms import Alarm
 from app.loop.tables.characteristics import Characteristic
