@@ -144,8 +144,8 @@ def test_what_happens_to_the_tool_counts_by_its_time(shop: Shop, other: str) -> 
     assert due(shop)["tightened"] is None
     with psycopg.connect(shop.server.database.dsn) as connection:
         connection.execute(
-            "INSERT INTO alarm (machine_id, kind, tool_memory, sequence, last_sequence)"
-            " SELECT id, 'offset_limit', 3, 1, 1 FROM machine WHERE key = %s",
+            "INSERT INTO alarm (machine_id, kind, tool_memory, sequence, last_sequence, data)"
+            " SELECT id, 'machine_fault', 3, 1, 1, '{\"location\": \"receiver\"}' FROM machine WHERE key = %s",
             (shop.machine,),
         )
     assert due(shop)["tightened"] == "alarm"

@@ -17,8 +17,8 @@ PERIOD = "from=2026-02-03T06:00:00Z&to=2026-02-03T10:00:00Z"
 @pytest.fixture(scope="module")
 def ran(common_shop: Shop, server: Server) -> Shop:
     """A flood of twelve alarms, three of them of one cause in a minute; a silent bridge, twice; one that is active ever since."""
-    flood = [("hunting", tool, 60.0 * tool, 30.0, None) for tool in range(1, 10)]
-    chatter = [("hunting", 20, 540.0 + 20 * number, 5.0, None) for number in range(3)]
+    flood = [("machine_fault", tool, 60.0 * tool, 30.0, None) for tool in range(1, 10)]
+    chatter = [("machine_fault", 20, 540.0 + 20 * number, 5.0, None) for number in range(3)]
     silent = [("bridge_silent", None, 7200.0, 90.0, 60), ("bridge_silent", None, 9000.0, 600.0, 60)]
     with server.database.begin() as session:
         for kind, tool, at, lasted, silent_for in [*flood, *chatter, *silent, ("tool_life", 30, 10_000.0, None, None)]:
@@ -28,6 +28,7 @@ def ran(common_shop: Shop, server: Server) -> Shop:
                 text("""
                 INSERT INTO alarm (machine_id, tool_memory, kind, raised_at, acknowledged_at, acknowledged_by, data)
                 SELECT id, :tool, :kind, :at, :ended, 'ana', jsonb_strip_nulls(jsonb_build_object('received_at', CAST(:heard AS text)))
+                    || '{"location": "receiver", "by": "parts", "parts": 520, "planned_parts": 500}'
                 FROM machine WHERE key = :key
                 """),
                 {
@@ -51,7 +52,12 @@ def test_it_counts_by_position_and_names_what_makes_the_noise(ran: Shop) -> None
     assert [flood["alarms"] for flood in position["floods"]] == [12]
     assert not found["enough"]
     loudest = found["top"][0]
-    assert (loudest["kind"], loudest["tool_memory"], loudest["alarms"], loudest["chatters"]) == ("hunting", 20, 3, True)
+    assert (loudest["kind"], loudest["tool_memory"], loudest["alarms"], loudest["chatters"]) == (
+        "machine_fault",
+        20,
+        3,
+        True,
+    )
     assert loudest["quieter_left"] is None
     silent = found["top"][1]
     assert (silent["kind"], silent["alarms"], silent["quieter_left"], silent["chatters"]) == (

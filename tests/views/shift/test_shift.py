@@ -38,8 +38,8 @@ def ran(common_shop: Shop, server: Server) -> Shop:
             ended = None if minutes is None else at + timedelta(minutes=minutes)
             session.execute(
                 text("""
-                INSERT INTO alarm (machine_id, tool_memory, kind, raised_at, acknowledged_at, acknowledged_by, outcome)
-                SELECT id, :tool, 'hunting', :at, :ended, :by, CAST(:outcome AS jsonb) FROM machine WHERE key = :key
+                INSERT INTO alarm (machine_id, tool_memory, kind, raised_at, acknowledged_at, acknowledged_by, outcome, data)
+                SELECT id, :tool, 'machine_fault', :at, :ended, :by, CAST(:outcome AS jsonb), '{"location": "receiver"}' FROM machine WHERE key = :key
                 """),
                 {
                     "tool": number + 1,
@@ -86,7 +86,7 @@ def test_its_page_leads_from_shift_to_shift(ran: Shop, server: Server) -> None:
     for words in ("Out of tolerance", "3 min", "10 min", "Shift before", "Next shift", "INBAND_SHIFTS", "by itself"):
         assert words in page
     assert "Next shift" not in viewer.open("/shift")
-    assert "Nothing was measured" in viewer.open("/shift?at=2020-01-01")
+    assert "Nothing was measured" in viewer.open("/shift?at=1971-01-01")
     assert "at:" in viewer.open("/shift?at=yesterday", 422)
 
 

@@ -1,6 +1,5 @@
 """Loading the state of readings: what the first load finds goes into the second, for readings of form."""
 
-import asyncio
 from datetime import UTC, datetime
 from typing import Any, cast
 
@@ -9,6 +8,7 @@ import msgspec
 from app.db.pipeline import Pipeline
 from app.loop.readings.writer import load
 from app.loop.readings.writer.snapshot import Snapshot
+from tests.loops import run
 
 
 class Answer:
@@ -27,5 +27,5 @@ def test_tools_of_form_go_back_to_the_oldest_correction_that_any_reading_names()
     machines: dict[int, dict[str, Any]] = {1: {"number": 3, "since": None}}
     named = [(1, 5, ten, None, None), (1, 3, nine, None, None), (1, 6, None, None, None)]
     answer = cast("Pipeline", Answer(named=named))
-    asyncio.run(load._load(answer, {}, Snapshot(), (), machines, (), optimistic=True))
+    run(load._load(answer, {}, Snapshot(), (), machines, (), optimistic=True))
     assert machines == {1: {"number": 3, "since": nine}}
