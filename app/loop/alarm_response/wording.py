@@ -1,5 +1,6 @@
 """The sentences about alarms: what is wrong, what to do, what each action brings about, and what followed."""
 
+import logging
 from collections.abc import Sequence
 
 from app.language.i18n import _, ngettext
@@ -10,6 +11,8 @@ from app.loop.alarms.kinds import kind_named
 from app.loop.alarms.reading_kinds import IMPLAUSIBLE, PROBE_FAULT
 from app.loop.tables.alarms import Alarm
 
+log = logging.getLogger(__name__)
+
 
 def kind_word(kind: str) -> str:
     """Return the name of an alarm kind."""
@@ -17,8 +20,12 @@ def kind_word(kind: str) -> str:
 
 
 def sentence(alarm: Alarm) -> str:
-    """Return the statement of what is wrong."""
-    return kind_named(alarm.kind).sentence(alarm)
+    """Return the statement of what is wrong. One whose numbers do not fit its sentence keeps no page from all others."""
+    try:
+        return kind_named(alarm.kind).sentence(alarm)
+    except (LookupError, TypeError, ValueError):
+        log.exception("alarm %s cannot be put into words", alarm.id)
+        return _("{kind}: its numbers cannot be read.").format(kind=kind_word(alarm.kind))
 
 
 def chart_of(row: AlarmRow) -> str:

@@ -10,6 +10,7 @@ import pytest
 from app.core.decision.step import Code
 from app.core.parameters import Parameters
 from app.language.short import MOST_WORDS, in_short, words
+from app.loop.alarm_response.wording import sentence
 from app.loop.alarms.kinds import AlarmKind, kind_named, kinds, register
 from app.loop.readings.records import Record
 from app.loop.readings.wording import reason
@@ -92,6 +93,10 @@ def test_what_is_read_in_passing_has_fifteen_words_at_most_and_nothing_is_broken
     for text in (*said, kind.what_to_do()):
         assert words(in_short(text)) <= MOST_WORDS, in_short(text)
         assert not in_short(text).endswith("…"), text
+
+
+def test_one_whose_numbers_are_missing_keeps_no_page_from_the_others() -> None:
+    assert sentence(Alarm(id=1, kind="hunting", data={})) == "Hunting: its numbers cannot be read."
 
 
 def test_so_it_is_with_every_reason_of_a_decision() -> None:
