@@ -5,6 +5,7 @@ import gc
 from collections.abc import AsyncIterator, Callable
 from contextlib import asynccontextmanager
 from functools import partial
+from threading import Event
 
 from fastapi import APIRouter, FastAPI, Request
 from prometheus_client import Histogram
@@ -19,6 +20,7 @@ from app.access.deps import recognise
 from app.access.keys import KeyRing
 from app.access.queries import still_granted
 from app.access.recognition import Lookups
+from app.core.compile_now import compile_each
 from app.db.connections import Connections, in_schema
 from app.db.engine import Database
 from app.db.replica import Replica
@@ -69,7 +71,7 @@ from app.loop.readings import aqdef_api, results_actions, table_api
 from app.loop.readings.by_hand import api as by_hand
 from app.loop.readings.door import Directory, ReadingsDoor
 from app.loop.readings.importing import pages as import_pages
-from app.loop.readings.writer.columnar import compile_now
+from app.loop.readings.writer import columnar
 from app.loop.readings.writer.group_commit import Writer
 from app.loop.summaries import api as statistics
 from app.loop.tools import api as tools
@@ -338,16 +340,26 @@ async def _nobody(_request: Request) -> None:
     """Recognise nobody: above all plants there are no people."""
 
 
+def _compile_now(ends: Event) -> None:
+    """Compile what the readings door needs, and then what pages need, so that nobody waits for the compiler."""
+    columnar.compile_now()
+    for _ in compile_each():
+        if ends.is_set():
+            return
+
+
 @asynccontextmanager
 async def process(ending: Callable[[], None]) -> AsyncIterator[None]:
     """The work of a server process for all its plants: compiling, the proof, memory given back."""
-    compiling = asyncio.get_running_loop().run_in_executor(None, compile_now)
+    ends = Event()
+    compiling = asyncio.get_running_loop().run_in_executor(None, _compile_now, ends)
     giving_back = asyncio.get_running_loop().create_task(give_back_free_memory(), name="free memory")
     proving = proofs.begin_later(keep_for_good)
     gc.collect()
     keep_for_good()
     yield
     ending()
+    ends.set()
     proving.cancel()
     giving_back.cancel()
     await compiling

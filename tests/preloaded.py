@@ -1,10 +1,13 @@
 """What a server needs in its first minute, read and compiled once for all that are forked: see `tests.forked`."""
 
+import fcntl
 import gc
 import importlib
 import pkgutil
+from pathlib import Path
 
 import app
+from app.core.compile_now import compile_each
 from app.loop.readings.writer.columnar import compile_now
 from app.web.templates import environment
 from tests import one_connection, quick_passwords  # noqa: F401 - they replace what they are about
@@ -13,7 +16,11 @@ gc.disable()
 for module in pkgutil.walk_packages(app.__path__, "app."):
     if not module.name.endswith("__main__"):
         importlib.import_module(module.name)
-compile_now()
+with Path(__file__).open() as lock:  # what one of several compiles, the others find
+    fcntl.flock(lock, fcntl.LOCK_EX)
+    compile_now()
+    for _ in compile_each():
+        pass
 for name in environment().list_templates():
     environment().get_template(name)
 gc.freeze()

@@ -17,7 +17,18 @@ from numba.core.registry import CPUDispatcher
 
 import app.core
 from app import HOUSE
+from app.core.compile_now import compile_each
 from app.core.compiled import compiled, functions_of, plain
+from app.core.decision.loops import follow, follow_each
+from app.core.effect import _missed, measured_effect
+from app.core.replay import Policy, ReplayedCharacteristic, figures_of, without_events
+from app.core.spc.cusum import _sums, cusum
+from app.core.spc.ewma import _smoothed, ewma
+from app.core.spc.mixture import _rounds, fitted_two_normals
+from app.core.spc.rules import signals_of, signals_of_cusum
+from app.core.spc.scan import beyond_runs, equal_runs, painted
+from app.core.spc.shewhart import individuals, individuals_baseline
+from tests.core.conftest import SEAT
 
 
 def doubled(values: Any) -> Any:
@@ -86,3 +97,21 @@ def test_it_says_the_same_as_the_python() -> None:
 def test_where_nothing_can_be_written_it_is_compiled_again(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(CacheImpl, "_locator_classes", [])
     assert compiled(doubled)(np.array([1.5]))[0] == 3.0
+
+
+def test_no_page_waits_for_the_compiler() -> None:
+    """The server compiles at its start with the types that pages call with later: these compile nothing again."""
+    for _ in compile_each():
+        pass
+    loops: list[Any] = [beyond_runs, equal_runs, painted, _smoothed, _sums, _rounds, _missed, follow, follow_each]
+    before = [list(loop.signatures) for loop in loops]
+    assert all(before)
+    history = np.random.default_rng(5).normal(0.0, 0.001, 3_000)
+    baseline = individuals_baseline(history)
+    for chart in (individuals(baseline, history), ewma(baseline, history)):
+        signals_of(chart).sides(0)
+    signals_of_cusum(cusum(baseline, history)).sides(0)
+    fitted_two_normals(np.vstack((history, history)))
+    measured_effect(history, (np.arange(3_000) // 9 % 5 * 0.002).astype(np.float64), -1.0, np.arange(3_000) % 100 == 0)
+    figures_of(without_events(history), [Policy((ReplayedCharacteristic(SEAT, 1.0),))] * 2)
+    assert [list(loop.signatures) for loop in loops] == before
