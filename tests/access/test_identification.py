@@ -95,6 +95,7 @@ def test_one_unknown_badge_counts_once_however_often_it_is_scanned(database: Dat
         assert len(session.scalars(select(LoginFailure)).all()) == 1
 
 
+@pytest.mark.long
 def test_badges_guessed_at_once_are_all_counted(database: Database, ana: int) -> None:
     shown = [Shown(badge=f"77001122{number:02}") for number in range(FREE_BADGES + 4)]
     with ThreadPoolExecutor(4) as pool:

@@ -227,6 +227,7 @@ def test_an_older_schema_is_not_brought_up_to_date_by_the_way(first_program: str
     assert (done.returncode, migrate.current(first_program)) == (0, migrate.head())
 
 
+@pytest.mark.long
 def test_an_older_program_gets_its_schema_back_when_somebody_says_what_may_be_lost(first_program: str) -> None:
     assert inband("migrate", "--database-url", first_program).returncode == 0
     back = ["migrate", "--back-to", migrate.SQUASHED, "--database-url", first_program]

@@ -122,6 +122,7 @@ def test_a_second_start_finds_what_the_first_one_stored(folder: Path) -> None:
         assert connection.execute("SELECT words, lower('ÄÖ') FROM kept").fetchone() == ("Grüße, µm", "äö")
 
 
+@pytest.mark.long
 def test_the_home_stays_closed(folder: Path) -> None:
     data = folder / "home" / "data"
     data.parent.mkdir(mode=0o700)
@@ -204,6 +205,7 @@ def test_a_killed_app_leaves_a_server_that_the_next_one_uses(data: Path) -> None
     assert not runs(pid)
 
 
+@pytest.mark.long
 def test_a_killed_server_recovers_at_the_next_start(data: Path) -> None:
     killed = start(data)
     url, pid = url_and_pid(killed)
@@ -237,6 +239,7 @@ def test_a_server_that_dies_while_it_is_used_comes_back(data: Path, monkeypatch:
     assert server.pid is None, "the last one out stops it all the same"
 
 
+@pytest.mark.long
 def test_the_log_of_a_server_that_runs_on_does_not_outgrow_the_disk(
     data: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -299,6 +302,7 @@ def test_an_initdb_killed_half_way_is_begun_again(folder: Path) -> None:
     assert not half.exists()
 
 
+@pytest.mark.long
 def test_a_long_path_has_its_socket_elsewhere(folder: Path, template: Path) -> None:
     server = EmbeddedServer(copied(template, folder / ("deep" * 20) / "data"))
     with server as url:

@@ -18,7 +18,6 @@ SIZES |= {"desk-zoomed": (640, 400), "phone-zoomed": (195, 422)}
 ALL: dict[str, Any] = {"rules": {"target-size": {"enabled": True}}}
 """Every rule that is on by default, and the size of targets (WCAG 2.5.8: 24 px, or as far from the next one)."""
 COLOURS: dict[str, Any] = {"runOnly": ["color-contrast"]}  # what else axe looks at is the same in other colours
-BUT_COLOURS: dict[str, Any] = {"rules": ALL["rules"] | {"color-contrast": {"enabled": False}}}
 
 State = tuple[str, Literal["light", "dark"], dict[str, Any]]
 """Size, colours, and which rules axe looks at."""

@@ -18,7 +18,6 @@ from app.access import devices
 from tests.conftest import Server, new_page
 from tests.pages.house import ADDRESSES, PAGES, furnished, values_of
 from tests.pages.looks import (
-    BUT_COLOURS,
     SIZES,
     STATES,
     State,
@@ -74,15 +73,11 @@ SAMPLE = {
     "/characteristics/{characteristic}/readings/3",
     "/station/{machine}",
 }
-"""Pages that axe sees in all states, and with its own rules of colours, also in the short run."""
+"""Pages that axe sees also in the short run."""
 
 
 USUAL = {addresses[0] for addresses in PAGES.values()} | BESIDE_THE_MACHINE | SAMPLE
 """Addresses that are looked at in the short run: each page once, and what is worked with gloves."""
-
-ALIKE = "details.operation ~ details.operation, plotly-chart .main-svg > *"
-"""What there is in hundreds, the operations of the page of the API and the marks of a chart, so that axe takes half a minute: it
-sees one of each group, and the chart as one picture, in the short run."""
 
 
 class Looks(NamedTuple):
@@ -93,7 +88,7 @@ class Looks(NamedTuple):
     beside_the_machine: tuple[str, ...]
 
 
-SHORT = Looks(("phone-zoomed", "phone", "desk"), (("desk", "light", BUT_COLOURS),), ("phone",))
+SHORT = Looks(("phone-zoomed", "desk"), (), ("phone",))
 WHOLE = Looks(tuple(sorted(SIZES, key=SIZES.__getitem__)), STATES, ("phone", "panel", "desk"))
 
 
@@ -152,8 +147,6 @@ def test_a_page_is_in_order(
         if more := too_wide(page):
             wide[size] = more
     pale = pale_words(page)
-    if looks is SHORT and address not in SAMPLE:
-        page.evaluate("(alike) => document.querySelectorAll(alike).forEach((each) => each.remove())", ALIKE)
     axe = violations(page, STATES if address in SAMPLE else looks.states)
     small = {}
     for size in looks.beside_the_machine if address in BESIDE_THE_MACHINE else ():

@@ -128,6 +128,7 @@ class TestByTouch:
         expect(page.get_by_role("row").filter(has_text=about)).to_have_count(0)
         assert hands.count == 2
 
+    @pytest.mark.long
     def test_type_in_a_size(self, page: Page, floor: Shop, operator: Person) -> None:
         hands, key = at_the_plant(page, operator), f"{floor.characteristic}-typed"
         floor.add(key, tool_memory=11, average_memory=12)
@@ -140,6 +141,7 @@ class TestByTouch:
         assert floor.call("GET", f"/readings/{key}/1")["context"]["operator"] == operator.name
         assert hands.count == 5
 
+    @pytest.mark.long
     def test_report_a_tool_change(self, page: Page, floor: Shop, operator: Person) -> None:
         hands = at_the_plant(page, operator)
         hands.tap(line(page, floor).get_by_role("link", name="T3"))
@@ -176,6 +178,7 @@ class TestAtTheDesk:
         expect(page.locator("#of-part")).to_contain_text("corrected in full")
         assert hands.count == 4
 
+    @pytest.mark.long
     def test_look_at_yesterday(self, page: Page, floor: Shop, engineer: Person) -> None:
         hands = at_the_plant(page, engineer)
         hands.click(name(page, floor))
@@ -186,6 +189,7 @@ class TestAtTheDesk:
         expect(page.locator("#numbers dd").first).to_have_text(str(floor.call("GET", counted)["count"]))
         assert hands.count == 3
 
+    @pytest.mark.long
     def test_see_the_capability(self, page: Page, floor: Shop, engineer: Person) -> None:
         hands = at_the_plant(page, engineer)
         hands.click(name(page, floor))
@@ -204,6 +208,7 @@ class TestAtTheDesk:
         assert floor.call("GET", f"/characteristics/{floor.characteristic}")["parameters"]["zero_range"] == 0.0015
         assert hands.count == 5
 
+    @pytest.mark.long
     def test_report_last_week_on_paper(self, page: Page, floor: Shop, engineer: Person) -> None:
         hands = at_the_plant(page, engineer)
         hands.click(name(page, floor))

@@ -108,6 +108,7 @@ class TestOnePlantKnowsNothingOfAnother:
         ]
         assert counts == [1, 3, 2]
 
+    @pytest.mark.long
     def test_nor_does_a_key_of_one_open_the_other(self, server: Server) -> None:
         north = client_of(server, "north")
         assert north.get("/api/v1/machines").status_code == 200
@@ -138,6 +139,7 @@ class TestOnePlantKnowsNothingOfAnother:
 
 
 class TestAddresses:
+    @pytest.mark.long
     def test_a_page_leads_to_pages_of_its_plant(self, server: Server, page: Page, complaints: list[str]) -> None:
         north = client_of(server, "north")
         set_up(north)

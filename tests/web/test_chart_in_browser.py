@@ -59,6 +59,7 @@ def test_a_part_of_the_chart_stays_while_readings_arrive_and_goes_by_back(open_p
         assert "zoom" not in page.url
 
 
+@pytest.mark.long
 def test_the_address_shows_the_same_part_and_one_button_the_whole(open_page: OpenPage, show: Show) -> None:
     with open_page("/chart?zoom=40..60") as page:
         until(page, DRAWN)
@@ -73,6 +74,7 @@ def test_the_address_shows_the_same_part_and_one_button_the_whole(open_page: Ope
         assert "zoom" not in page.url
 
 
+@pytest.mark.long
 def test_with_pan_switched_on_dragging_moves(open_page: OpenPage) -> None:
     with open_page("/chart?zoom=40..60") as page:
         until(page, DRAWN)

@@ -102,6 +102,7 @@ def test_a_burst_of_events_is_few_requests(open_page: OpenPage, show: Show) -> N
         assert len(asked) <= 2 + time.monotonic() - begun, "at once, and then once a second"
 
 
+@pytest.mark.long
 def test_the_theme_switch_repaints_charts_and_is_remembered(open_page: OpenPage) -> None:
     with open_page("/chart", color_scheme="light") as page:
         until(page, DRAWN)

@@ -178,6 +178,7 @@ def test_who_was_first_is_told_in_plant_time(shop: Shop) -> None:
     assert re.search(r"on \d{4}-\d\d-\d\dT\d\d:\d\d:\d\d\+0[12]:00:", problem["detail"])
 
 
+@pytest.mark.long
 def test_a_browser_elsewhere_shows_the_plants_time_too(
     berlin: Shop, server: Server, viewer: Person, browser: Any
 ) -> None:

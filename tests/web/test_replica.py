@@ -108,6 +108,7 @@ def test_a_report_that_is_fetched_is_in_the_record_of_changes(followed: Shop, se
     assert rows(servers.nodes[0].url, written, f"characteristic/{followed.characteristic}")
 
 
+@pytest.mark.long
 def test_a_person_sees_their_own_change_and_others_are_told_how_old_it_is(
     followed: Shop, server: Server, servers: Cluster
 ) -> None:
@@ -150,6 +151,7 @@ def state(server: Server) -> tuple[Any, bool]:
     return server.client().get("/health/ready").json()["replica"], "\ninband_replica_used 1.0" in text
 
 
+@pytest.mark.long
 def test_one_that_lags_too_far_is_not_read(followed: Shop, server: Server, servers: Cluster) -> None:
     assert state(server)[1]
     with paused(servers):

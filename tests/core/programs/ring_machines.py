@@ -12,6 +12,7 @@ from functools import cache
 from types import CodeType
 from typing import Any
 
+from app.core.programs.ring_dialects import RingText
 from app.core.programs.ring_settings import Offsets, RingControl, RingSettings
 from app.core.programs.ring_texts import joined, texts
 from app.core.ring import SIZE
@@ -24,6 +25,12 @@ ARGUMENTS = dict(
         strict=True,
     )
 )
+
+
+@cache
+def _texts(settings: RingSettings) -> list[RingText]:
+    """The programs as they are written once; machines are made by the thousand."""
+    return texts(settings)
 
 
 class PowerLost(Exception):
@@ -139,7 +146,7 @@ class Sinumerik(Machine):
 
     def load(self, settings: RingSettings) -> None:
         self.programs: dict[str, list[str]] = {}
-        for text in texts(settings):
+        for text in _texts(settings):
             if found := re.match(r"PROC (\w+)", text.text):
                 self.programs[found[1]] = text.text.splitlines()
         self.fields = {"INBAND": _Field(SIZE), "INBAND_EFFECT": _Field(100), "R": _Field()}
@@ -293,7 +300,7 @@ class Fanuc(Machine):
     digits, decimals = 8, 4
 
     def load(self, settings: RingSettings) -> None:
-        text = joined(settings, [text for text in texts(settings) if text.key != "call"])
+        text = joined(settings, [text for text in _texts(settings) if text.key != "call"])
         self.programs: dict[int, list[str]] = {}
         lines: list[str] = []
         for line in text.splitlines():

@@ -73,6 +73,7 @@ class TestInABrowser:
         expect(page.locator("tbody tr")).to_have_count(2)
         expect(page.locator("plotly-chart .main-svg").first).to_be_visible()
 
+    @pytest.mark.long
     def test_the_touch_that_does_not_fit_is_named_and_left_out(self, shop: Shop, operator: Person, page: Page) -> None:
         operator.sign_in(page)
         page.goto(f"/alignments/new?machine={shop.machine}")

@@ -65,6 +65,7 @@ def test_a_protocol_of_last_month_and_of_today(shop: Shop, page: Page, tmp_path:
     expect(page.get_by_text("it is version 3 now")).to_be_visible()
 
 
+@pytest.mark.long
 def test_every_diagram_is_red_and_green_and_tells_them_apart_without_colour(shop: Shop, page: Page) -> None:
     run = take(shop, axes=[axis(both=True, backlash=0.002)])
     page.goto(f"/kinematics/runs/{run}")
@@ -116,6 +117,7 @@ def test_positions_are_typed_into_the_grid(shop: Shop, page: Page, complaints: l
     assert runs(shop)[0]["axes"][0]["points"] == 6
 
 
+@pytest.mark.long
 def test_the_drift_is_followed_and_a_value_chosen(shop: Shop, page: Page) -> None:
     for day in (1, 2, 3):
         take(shop, axes=[axis(seed=day)], measured_at=f"2026-11-{day:02}T06:00:00Z")

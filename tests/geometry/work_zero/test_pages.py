@@ -3,6 +3,7 @@
 import re
 from typing import Any
 
+import pytest
 from playwright.sync_api import Page, expect
 
 from tests.pages.looks import boxes, live
@@ -168,6 +169,7 @@ class TestAVice:
 
 
 class TestAgain:
+    @pytest.mark.long
     def test_with_another_tip(self, shop: Shop, operator: Person, page: Page, complaints: list[str]) -> None:
         operator.sign_in(page)
         page.goto("/work-zeros/new?kind=pocket")

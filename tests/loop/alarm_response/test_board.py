@@ -156,6 +156,7 @@ class TestTwoTouches:
         shop.acknowledge(shop.alarms()[0]["id"], "noted")
         expect(page.locator("main")).to_contain_text("No active alarms")
 
+    @pytest.mark.long
     def test_one_may_change_ones_mind(self, shop: Shop, operator: Person, page: Page) -> None:
         shop.read(20.0)
         operator.sign_in(page)
@@ -170,6 +171,7 @@ class TestTwoTouches:
         expect(page.get_by_role("dialog")).to_have_count(0)
         assert len(shop.alarms()) == 1
 
+    @pytest.mark.long
     def test_targets_are_large_enough_for_gloves(self, shop: Shop, operator: Person, page: Page) -> None:
         shop.read(350.0)
         operator.sign_in(page)

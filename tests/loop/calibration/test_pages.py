@@ -274,6 +274,7 @@ class TestInABrowser:
         expect(page.locator("plotly-chart .main-svg").first).to_be_visible()
         expect(page.locator("#history")).to_contain_text("Stylus replaced")
 
+    @pytest.mark.long
     def test_pairs_are_pasted_and_accepted(self, shop: Shop, operator: Person, page: Page) -> None:
         operator.sign_in(page)
         page.goto(place(shop))

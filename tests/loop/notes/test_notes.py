@@ -172,6 +172,7 @@ class TestPages:
         assert "Wrong shaft" in engineer.send(f"/notes/{number}/withdraw", reason="Wrong shaft")
         assert "Already withdrawn by another user" in engineer.send(f"/notes/{number}/withdraw", reason="Again")
 
+    @pytest.mark.long
     def test_at_the_station(self, running: Shop, server: Server, page: Page) -> None:
         Person(server, "operator").sign_in(page)
         page.goto(f"/station/{running.machine}")

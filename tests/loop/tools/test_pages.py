@@ -149,6 +149,7 @@ class TestInABrowser:
         expect(page.locator("#steps")).to_contain_text(operator.name)
         expect(page.locator("plotly-chart .main-svg").first).to_be_visible()
 
+    @pytest.mark.long
     def test_the_tool_shown_stays_when_another_matters_more(self, shop: Shop, operator: Person, page: Page) -> None:
         """Its number, its offset and its buttons belong together, whatever is corrected meanwhile."""
         other = f"{shop.characteristic}-2"

@@ -36,6 +36,7 @@ class TestCorrections:
         assert shop.correction(1)["status"] == "applied"
         assert shop.tool()["offset"] == -0.0061
 
+    @pytest.mark.long
     def test_what_comes_later_is_announced_and_not_slipped_in(self, shop: Shop, operator: Person, page: Page) -> None:
         shop.read(6.1)
         operator.sign_in(page)

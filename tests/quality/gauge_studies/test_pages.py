@@ -255,6 +255,7 @@ class TestInTheBrowser:
         page.wait_for_url("**/setup/characteristics/**done=**")
         assert shop.call("GET", f"/characteristics/{shop.characteristic}")["parameters"]["zero_range"] == 0.0018
 
+    @pytest.mark.long
     def test_a_block_from_a_spreadsheet_is_pasted_into_the_first_cell(
         self, page: Page, shop: Shop, engineer: Person, complaints: list[str]
     ) -> None:

@@ -224,6 +224,7 @@ class TestInTheBrowser:
         expect(page.locator("#now")).to_contain_text("Compensation is paused")
         eventually(page, f"{box}.bottom <= innerHeight")
 
+    @pytest.mark.long
     def test_a_click_on_a_point_shows_its_reading_and_the_link_opens_it(
         self, shop: Shop, viewer: Person, page: Page
     ) -> None:
@@ -263,6 +264,7 @@ class TestInTheBrowser:
         page.get_by_role("button", name="Exclude", exact=True).click()
         expect(page.locator("#reading")).to_contain_text("chip on the stylus")
 
+    @pytest.mark.long
     def test_scale_and_number_are_in_the_address(self, shop: Shop, viewer: Person, page: Page) -> None:
         shop.read(6.1)
         viewer.sign_in(page)

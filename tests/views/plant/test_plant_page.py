@@ -173,6 +173,7 @@ class TestLive:
         shop.add(f"{shop.characteristic}-late", tool_memory=9)
         expect(page.locator(f"#c-{shop.characteristic}-late")).to_be_visible()
 
+    @pytest.mark.long
     def test_by_keyboard_to_the_characteristic(self, shop: Shop, viewer: Person, page: Page) -> None:
         viewer.sign_in(page)
         page.goto(f"/plant/{shop.machine}")
@@ -181,6 +182,7 @@ class TestLive:
         page.keyboard.press("Enter")
         page.wait_for_url(f"**/characteristics/{shop.characteristic}")
 
+    @pytest.mark.long
     def test_a_calm_state_grows_old_while_the_page_is_open(self, shop: Shop, viewer: Person, page: Page) -> None:
         shop.read(0.2)
         viewer.sign_in(page)

@@ -65,6 +65,7 @@ def test_what_is_meant_for_programs_is_alone_on_standard_output(
     assert first == "section,row,key,name,value,unit,text"
 
 
+@pytest.mark.long
 def test_several_in_a_folder_a_zip_or_a_workbook(story: Shop, second: str, tmp_path: Path) -> None:
     both: tuple[Any, ...] = (story.characteristic, second, "--section", "numbers")
     folder = tmp_path / "week 47 Đ"

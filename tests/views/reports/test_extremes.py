@@ -161,6 +161,7 @@ def test_names_without_end_break_no_page(shop: Shop) -> None:
     assert pages < 12
 
 
+@pytest.mark.long
 def test_a_long_history_is_no_book(shop: Shop) -> None:
     """Six hundred readings, each of which corrects: what is listed is bounded, and says how much is left out."""
     key = shop.another("many", zero_range=0.0, weighting_factor=1, averaging_limit=0.001)

@@ -317,6 +317,7 @@ def test_finished_ones_are_thrown_away_after_a_week(bores: Shop) -> None:
     assert len(fetched(bores, young).namelist()) == 2
 
 
+@pytest.mark.long
 def test_the_oldest_files_go_first_when_they_are_too_much(bores: Shop, monkeypatch: pytest.MonkeyPatch) -> None:
     old, young = (done(bores, ask(bores, characteristics=["bore-0"], sections=["numbers"])["id"]) for _n in "12")
     monkeypatch.setattr(actions, "KEPT_BYTES", young["size"] + 1)
@@ -370,6 +371,7 @@ class TestPage:
         assert f'href="/api/v1/reports/{number}/file"' in text
         assert viewer.browser.get(f"/api/v1/reports/{number}/file").status_code == 200
 
+    @pytest.mark.long
     def test_the_bar_moves_and_ends_in_a_file_without_a_reload(self, bores: Shop, viewer: Person, page: Page) -> None:
         viewer.sign_in(page)
         page.goto("/reports?characteristic=bore-3")

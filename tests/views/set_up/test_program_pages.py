@@ -43,6 +43,7 @@ class TestReading:
         made = shop.call("GET", f"/characteristics/{key}")["parameters"]
         assert (made["zero_range"], made["averaging_limit"], made["tool_memory"]) == (0.0012345678901, 0.0053, 3)
 
+    @pytest.mark.long
     def test_a_file_gives_its_parameters_to_one_that_stands(
         self, shop: Shop, engineer: Person, page: Page, tmp_path: Path
     ) -> None:
@@ -100,6 +101,7 @@ class TestReading:
 
 
 class TestWriting:
+    @pytest.mark.long
     def test_copy_and_download(self, shop: Shop, engineer: Person, page: Page) -> None:
         engineer.sign_in(page)
         page.context.grant_permissions(["clipboard-read", "clipboard-write"])

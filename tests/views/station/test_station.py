@@ -259,6 +259,7 @@ def test_it_says_plainly_that_live_data_is_lost(
     complaints.clear()  # the browser notes every attempt that failed
 
 
+@pytest.mark.long
 def test_sound_and_title_when_an_alarm_comes(page: Page, shop: Shop, operator: Person) -> None:
     operator.sign_in(page)
     page.add_init_script(TONES)

@@ -61,6 +61,7 @@ def test_machines_and_pickers_have_the_same_count(waits: Shop, server: Server, o
     assert re.search(link + r'[^<]*<span class="tab-count">3</span>', operator.open("/todo"))
 
 
+@pytest.mark.long
 def test_the_chosen_machine_is_carried_along(waits: Shop, operator: Person) -> None:
     def links(text: str) -> list[str]:
         return re.findall(r'<li>\s*<a href="([^"]*)"', text.split('aria-label="Main"')[1])[:5]

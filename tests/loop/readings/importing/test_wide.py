@@ -53,6 +53,7 @@ def client(server: Server, engineer: Person) -> httpx.Client:
 
 
 @pytest.mark.browser
+@pytest.mark.long
 def test_a_wide_workbook_on_the_page(shop: Shop, engineer: Person, page: Page, tmp_path: Path) -> None:
     one, two = shop.characteristic, f"{shop.characteristic}-b"
     shop.add(two)

@@ -421,6 +421,7 @@ def test_a_file_on_the_page(shop: Shop, engineer: Person, page: Page, tmp_path: 
     assert [each["measured"] for each in found] == [39.991, 39.992, 39.992]
 
 
+@pytest.mark.long
 def test_a_pair_is_sent_together_and_what_is_wrong_is_shown(shop: Shop, engineer: Person) -> None:
     client = engineer.browser
     head = f"K0100 1\nK2001/1 {shop.characteristic}\nK2142/1 mm\n"
