@@ -225,7 +225,7 @@ class TestWriters:
 
 class TestPages:
     @pytest.mark.parametrize("count", SOME_OR_ALL)
-    @pytest.mark.parametrize("limit", [999, 1000])
+    @pytest.mark.parametrize("limit", [pytest.param(999, marks=pytest.mark.long), 1000])
     def test_every_reading_is_on_one_page(self, client: httpx.Client, limit: int, count: int) -> None:
         numbers: list[int] = []
         after: int | None = MANY - count

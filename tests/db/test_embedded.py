@@ -103,6 +103,7 @@ def until(condition: Callable[[], bool], seconds: float = 60) -> bool:
     return True
 
 
+@pytest.mark.long
 def test_a_second_start_finds_what_the_first_one_stored(folder: Path) -> None:
     with EmbeddedServer(folder / "data") as url, psycopg.connect(url) as connection:
         connection.execute("CREATE TABLE kept AS SELECT 'Grüße, µm' AS words")
@@ -159,6 +160,7 @@ def test_an_ordinary_user_has_it_in_a_closed_home_of_their_own(folder: Path) -> 
     assert leave(again)
 
 
+@pytest.mark.long
 def test_the_last_one_out_stops_it(data: Path) -> None:
     first = start(data)
     url, pid = url_and_pid(first)

@@ -175,6 +175,7 @@ class TestAddresses:
         assert answer.headers["location"] == "/p/north/api/v1/machines/lathe-loc"
         assert get(f"{server.url}{answer.headers['location']}", headers=north.headers).status_code == 200
 
+    @pytest.mark.long
     def test_a_plant_may_have_a_host_name_and_keeps_its_schema_when_it_is_removed(self, server: Server) -> None:
         add(server, "hosted", host="hosted.example")
         at_host = {"Host": "hosted.example:8443"}

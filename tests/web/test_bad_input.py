@@ -970,7 +970,7 @@ def test_it_is_the_same_through_a_socket(server: Server) -> None:
         refused_and_nothing_stored(attempt, [operation_named(name)], place)
 
 
-@pytest.mark.parametrize("turn", range(3))
+@pytest.mark.parametrize("turn", [0, *(pytest.param(turn, marks=pytest.mark.long) for turn in (1, 2))])
 def test_what_all_this_was_tried_on_can_be_done(new_database: NewDatabase, turn: int) -> None:
     """The bodies above are good ones: what was refused was refused for what was changed in them."""
 

@@ -88,6 +88,7 @@ def test_the_chart_follows_the_readings(open_page: OpenPage, show: Show) -> None
         until(page, "document.querySelector('#zones .plot').data.find((t) => t.meta === 'readings').x.length === 121")
 
 
+@pytest.mark.long
 def test_a_burst_of_events_is_few_requests(open_page: OpenPage, show: Show) -> None:
     with open_page("/chart?live=1") as page:
         until(page, DRAWN)

@@ -602,6 +602,7 @@ class TestPage:
         page.evaluate("dispatchEvent(new Event('afterprint'))")
         assert page.locator("details.operation[open]").count() == 1
 
+    @pytest.mark.long
     def test_it_is_linked_and_knows_who_is_signed_in(self, page: Page, server: Server) -> None:
         password = server.person("Dora", "viewer")
         page.goto("/sign-in")

@@ -97,6 +97,7 @@ def test_the_loop_holds_sizes_far_better_than_no_loop(server: Server, spec: plan
             assert with_loop < (feature.upper - feature.lower) / 6
 
 
+@pytest.mark.long
 def test_a_chipped_edge_stops_the_machine_until_somebody_replaces_the_tool(server: Server) -> None:
     with begun(server, replace(plant.LATHE_1, first_chip=(3, 7))) as line:
         line.fill(10)

@@ -177,6 +177,7 @@ class TestCharacteristics:
         assert "It measures only" in engineer.open(f"/setup/characteristics/{key}")
         assert shop.call("GET", f"/characteristics/{key}")["parameters"]["average_memory"] == 0
 
+    @pytest.mark.long
     def test_a_list_of_very_many_goes_on_on_another_page(self, engineer: Person, server: Server, shop: Shop) -> None:
         keys = [f"{shop.machine}-{number:03}" for number in range(201)]
         with server.database.begin() as session:
