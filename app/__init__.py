@@ -29,6 +29,7 @@ only through each other's queries and actions. frontend/ and migrations/ lie bes
         characteristic   one characteristic: zone chart, decisions, capability
         set_up           machines, characteristics, people, programs, the record, background jobs
     quality          judgement of processes and of measuring systems
+        temperature      drift by temperature, by warming up after a pause, and by wear, with what cannot be separated
         sampling         how many parts need not be measured, with the risk of it
         trial            a characteristic that only measures, and the loop that would have corrected it
         ledger           what corrections were worth: rejects prevented and caused, in pieces and in money
@@ -59,6 +60,7 @@ only through each other's queries and actions. frontend/ and migrations/ lie bes
         notes            what a person writes down at a machine or a characteristic, at a moment
         alarms           kinds of alarms, raised once
         readings         the door: probe readings come in, are decided, stored and answered together
+        expansion        thermal expansion of characteristics, sizes at 20 °C beside the measured ones
         characteristics  nominal, limits, and the versions of the R parameters
         warnings         implausible values that a person acknowledges before a machine gets them
         machines         machine tools, their keys, the lock that orders everything that happens on one machine

@@ -53,6 +53,7 @@ from app.loop.connections.touch_tests import pages as touch_test_pages
 from app.loop.control_plan import api as control_plan
 from app.loop.control_plan import jobs as control_plan_jobs
 from app.loop.control_plan import pages as control_plan_pages
+from app.loop.expansion import api as expansion
 from app.loop.faults import api as faults
 from app.loop.machines import api as machines
 from app.loop.machines import keys_api as machine_keys
@@ -105,6 +106,8 @@ from app.quality.proof import pages as proof_pages
 from app.quality.proof import queries as proofs
 from app.quality.sampling import api as sampling
 from app.quality.sampling import pages as sampling_pages
+from app.quality.temperature import api as temperature
+from app.quality.temperature import pages as temperature_pages
 from app.quality.trial import api as trial
 from app.quality.trial import pages as trial_pages
 from app.quality.wear import actions as wear_actions
@@ -160,6 +163,7 @@ ROUTERS: tuple[APIRouter, ...] = (
     connections_api.router,
     touch_tests_api.router,
     characteristics.router,
+    expansion.router,
     figures_api.router,
     statistics.router,
     capability.router,
@@ -182,6 +186,7 @@ ROUTERS: tuple[APIRouter, ...] = (
     ledger.router,
     trial.router,
     sampling.router,
+    temperature.router,
     signals_api.router,
     readings.push,
     reading_list.router,
@@ -234,6 +239,7 @@ ROUTERS: tuple[APIRouter, ...] = (
     ledger_pages.router,
     trial_pages.router,
     sampling_pages.router,
+    temperature_pages.router,
     signals_pages.router,
     capability_pages.router,
     six_pack.router,

@@ -191,7 +191,7 @@ def fit(sequence: NDArray[np.int64], curve: Values) -> Fit | None:
     spread = float(((x - centre) ** 2).sum())
     slope = float(((x - centre) * y).sum() / spread) if varies(float(np.ptp(y)), y) else 0.0
     residual = y - y.mean() - slope * (x - centre)
-    rho = _correlation(residual) if varies(float(np.ptp(residual)), y) else 0.0
+    rho = autocorrelation(residual) if varies(float(np.ptp(residual)), y) else 0.0
     effective = max(4.0, count * (1 - rho) / (1 + rho))
     scatter = max(sqrt(float((residual**2).sum()) / max(1.0, count - 2)), _rounding(y))
     inflation = count / effective
@@ -255,7 +255,7 @@ def _rounding(readings: Values) -> float:
     return resolution_of(readings).step / sqrt(12)
 
 
-def _correlation(residual: Values) -> float:
+def autocorrelation(residual: Values) -> float:
     """Lag-1 autocorrelation of the residuals of a line, freed of its bias, never below 0."""
     squares = float((residual**2).sum())
     if squares <= 0:

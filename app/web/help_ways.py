@@ -25,6 +25,7 @@ _BEHIND: tuple[tuple[str, str], ...] = (
     (r"/characteristics/[^/]+/(rules|signals)|/signals/.*", "how-to/run-rules"),
     (r"/characteristics/[^/]+/(capability|six-pack)|/overview", "how-to/capability"),
     (r"/characteristics/[^/]+/(control-plan|sampling)", "how-to/control-plan"),
+    (r"/characteristics/[^/]+/temperature", "how-to/temperature"),
     (r"/characteristics/[^/]+/trial(/.*)?", "how-to/shadow-trial"),
     (r"/ledger", "how-to/ledger"),
     (r"/shift", "how-to/shift"),

@@ -83,6 +83,7 @@ ADDED_TABLES = {
     "missed_measurement",
     "reaction_plan",
     "catalogue_entry",
+    "thermal_expansion",
 }
 
 

@@ -98,6 +98,11 @@ PAGES = {
         "/characteristics/{characteristic}/sampling?seconds=12",
         "/characteristics/{characteristic}-empty/sampling",
     ],
+    "/characteristics/{characteristic}/temperature": [
+        "/characteristics/{characteristic}/temperature",
+        "/characteristics/{characteristic}-warm/temperature",
+        "/characteristics/{characteristic}-empty/temperature",
+    ],
     "/characteristics/{characteristic}/control-plan": [
         "/characteristics/{characteristic}/control-plan",
         "/characteristics/{characteristic}-empty/control-plan",
@@ -280,6 +285,20 @@ def furnished(server: Server) -> Shop:
         planned_parts=400,
         sister=13,
     )
+    warm = f"{made.characteristic}-warm"
+    made.add(warm, tool_memory=0, average_memory=0)
+    degrees = [21 + at % 17 / 4 for at in range(60)]
+    made.push(
+        [at % 5 + degree for at, degree in enumerate(degrees)],
+        warm,
+        context=[{"part_temperature": each} for each in degrees],
+    )
+    steel: dict[str, Any] = {
+        "coefficient": 11.5,
+        "temperature_uncertainty": 0.5,
+        "reason": "16MnCr5, as on the drawing",
+    }
+    made.call("PUT", f"/characteristics/{warm}/expansion", **steel)
     made.call("POST", f"/machines/{made.machine}/heartbeat", **HEARTBEAT)
     tests = f"/machines/{made.machine}/touch-tests"
     test = made.call("POST", tests, 201, tool_memory=14)["id"]

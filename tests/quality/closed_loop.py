@@ -24,11 +24,12 @@ def cut(
     delay: int = 1,
     tool: int = 3,
     jumps: Sequence[int] = (),
+    **more: Sequence[Any],
 ) -> list[dict[str, Any]]:
     """Cut and measure these parts, each with the corrections issued more than ``delay`` parts before it.
 
     The decisions are foretold, so that all the readings go in one batch: the answers must be those foretold. jumps: parts
-    whose size is implausible.
+    whose size is implausible. more: what is sent with each.
     """
     key = characteristic or shop.characteristic
     parameters = read(shop.call("GET", f"/characteristics/{key}")["parameters"])[0]
@@ -58,7 +59,7 @@ def cut(
                 amounts[number] = decision.amount
         offsets.append((number, offset))
         foretold.append(None if decision.amount is None else (newest, decision.amount))
-    answers = shop.push(sizes, key, answers=True, correction_in_effect=numbers)
+    answers = shop.push(sizes, key, answers=True, correction_in_effect=numbers, **more)
     told = [each["correction"] and (each["correction"]["number"], each["correction"]["amount"]) for each in answers]
     assert told == foretold
     return answers

@@ -340,7 +340,14 @@ def body_of(operation: Json) -> Json:
 
 
 # What these ask for, the twenty readings of this server do not carry: a good request, and a refusal in words.
-OF_MANY_READINGS = ("/baselines", "/trial", "/sampling", "/baselines/preview", "/gauge-studies/from-readings")
+OF_MANY_READINGS = (
+    "/baselines",
+    "/trial",
+    "/sampling",
+    "/temperature",
+    "/baselines/preview",
+    "/gauge-studies/from-readings",
+)
 
 
 # What a page's form does, by the operations of the API that do the same; None: there is none, or it is for everybody.
@@ -353,6 +360,7 @@ FORMS: dict[str, tuple[str, ...] | None] = {
     "/alarms/{number}/affected": ("set_parts_aside",),
     "/characteristics/{characteristic}/trial/start": ("start_correcting",),
     "/characteristics/{characteristic}/control-plan": ("set_control_plan",),
+    "/characteristics/{characteristic}/temperature": ("set_expansion",),
     "/quarantines/{number}/parts/{part}/{what}": ("measure_part_again", "release_part", "scrap_part"),
     "/alignments/new": ("align",),
     "/alignments/pallets/new": ("compose_pallet",),

@@ -2,7 +2,7 @@
 
 from collections.abc import Iterable
 from datetime import datetime
-from typing import Annotated, Any
+from typing import Annotated, Any, Self
 
 from pydantic import BaseModel, Field
 
@@ -10,7 +10,9 @@ from app.core.decision.decide import needs_approval
 from app.core.decision.step import DECIMALS, Action
 from app.core.parameters import Parameters
 from app.core.probing import Touches
+from app.core.temperature import AtReference, Missing
 from app.core.variants import Results
+from app.loop.expansion.wording import at_20_words
 from app.loop.readings.by_hand.schemas import HandMeasurementOut
 from app.loop.readings.records import Record
 from app.loop.readings.wording import reason
@@ -190,9 +192,45 @@ class ReadingContextOut(BaseModel):
     comment: Annotated[str | None, Field(description="Remark.")] = None
     events: Annotated[list[str] | None, Field(description="What happened at the part or before it.")] = None
     process: Annotated[dict[str, float] | None, Field(description="Process parameters by name.")] = None
+    part_temperature: Annotated[float | None, Field(description="Temperature of the part, °C, as it was sent.")] = None
+    machine_temperature: Annotated[
+        float | None, Field(description="Temperature of the machine, °C, as it was sent.")
+    ] = None
     fields: Annotated[
         dict[str, str] | None, Field(description="Further fields of a value in an AQDEF file, by their K number.")
     ] = None
+
+
+class AtTwenty(BaseModel):
+    """The size of a reading at 20 °C, the reference temperature of ISO 1; mm. The reading was decided by the size as it was measured."""
+
+    size: Annotated[float | None, Field(description="Size at 20 °C; null: there is none, see `missing`.")]
+    correction: Annotated[float | None, Field(description="Size at 20 °C less the measured one.")]
+    uncertainty: Annotated[
+        float | None,
+        Field(
+            description="Standard uncertainty of the correction, from temperatures and coefficients; null: none is stated."
+        ),
+    ]
+    missing: Annotated[
+        Missing | None,
+        Field(
+            description="The reason why there is no size at 20 °C: no `coefficient` is stated, one of the temperatures was not sent, or one "
+            "cannot be true (`not_believed`: below −30 or above 150 °C)."
+        ),
+    ]
+
+    text: Annotated[str, Field(description="The same in words.")]
+
+    @classmethod
+    def of(cls, found: AtReference | Missing | None) -> Self | None:
+        """As it is answered; None of a reading without any temperature."""
+        if found is None:
+            return None
+        text = at_20_words(found)
+        if isinstance(found, Missing):
+            return cls(size=None, correction=None, uncertainty=None, missing=found, text=text)
+        return cls(**found._asdict(), missing=None, text=text)
 
 
 class ReadingDetail(ReadingRow):
@@ -213,3 +251,9 @@ class ReadingDetail(ReadingRow):
         ),
     ]
     context: Annotated[ReadingContextOut | None, Field(description="Its circumstances, if any were sent.")]
+    at_20: Annotated[
+        AtTwenty | None,
+        Field(
+            description="Its size at 20 °C, beside the measured one; null: no temperature was sent with it, or it is a probe fault."
+        ),
+    ]

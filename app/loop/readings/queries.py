@@ -15,7 +15,8 @@ from app.core.variants import Results
 from app.errors import FieldError, Invalid, NotFound
 from app.language.i18n import _
 from app.loop.characteristics import queries as characteristics
-from app.loop.readings.answers import answer
+from app.loop.expansion.queries import at_20, expansion_of
+from app.loop.readings.answers import AtTwenty, answer
 from app.loop.readings.by_hand import queries as by_hand
 from app.loop.readings.by_hand.wording import as_json as in_json
 from app.loop.readings.records import Entry, Record
@@ -286,13 +287,21 @@ def detail(session: Session, entry: Entry, sequence: int) -> dict[str, Any]:
         )
     )
     measurements = by_hand.of_readings(session, entry.machine_id, entry.characteristic_id, [sequence])
-    return answers(session, entry, [record])[0] | {
+    (found,) = answers(session, entry, [record])
+    return found | {
         "by_hand": [in_json(measurement) for measurement in measurements.get(sequence, ())],
         "touches": touches_of(session, entry, [sequence]).get(sequence),
         "machined_at": record.machined_at,
         "correction_in_effect": record.correction_in_effect,
         "context": context,
+        "at_20": None if record.zone == Zone.PROBE_FAULT else _at_20(session, entry, found["size"], context),
     }
+
+
+def _at_20(session: Session, entry: Entry, size: float, context: Mapping[str, Any] | None) -> AtTwenty | None:
+    if context is None:  # of nearly all
+        return None
+    return AtTwenty.of(at_20(size, context, expansion_of(session, entry.machine_id, entry.characteristic_id)))
 
 
 def hand_measurements(

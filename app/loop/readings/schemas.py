@@ -55,7 +55,18 @@ class Context(Struct, forbid_unknown_fields=True, omit_defaults=True):
     ] = None
     process: Annotated[
         Annotated[dict[_Text, _Number], Meta(max_length=MOST_OF_CONTEXT)] | None,
-        Meta(description="Process parameters by name, with their unit in the name: a temperature, a spindle speed."),
+        Meta(description="Process parameters by name, with their unit in the name: a pressure, a spindle speed."),
+    ] = None
+    part_temperature: Annotated[
+        _Number | None,
+        Meta(
+            description="Temperature of the part when it was measured, °C. One that cannot be true is stored as it is sent, and not "
+            "used: no reading is refused for a broken sensor. Nothing is decided by it."
+        ),
+    ] = None
+    machine_temperature: Annotated[
+        _Number | None,
+        Meta(description="Temperature of the machine, at its scale or its frame, °C; as `part_temperature`."),
     ] = None
     fields: Annotated[
         Annotated[
@@ -393,6 +404,8 @@ _MUST: dict[str, Callable[[], str]] = dict.fromkeys(("order", "batch", "operator
     "comment": lambda: _("a text of 1 to {most} characters").format(most=LONGEST_COMMENT),
     "events": lambda: _("a list of at most {most} texts").format(most=MOST_OF_CONTEXT),
     "process": lambda: _("an object of at most {most} numbers by name").format(most=MOST_OF_CONTEXT),
+    "part_temperature": lambda: _("a number in °C, without quotes"),
+    "machine_temperature": lambda: _("a number in °C, without quotes"),
     "fields": lambda: _("an object of texts by field, K0009 for example"),
 }
 
