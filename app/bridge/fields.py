@@ -18,10 +18,14 @@ FIELDS: Final = (
     "part",
     "correction_in_effect",
     "key",
+    "part_temperature",
+    "machine_temperature",
 )
 """What a column, a member, or a named group of a regular expression may be."""
 EVERY: Final = "*"
 """The name in ``characteristics`` that stands for readings that name none."""
+TEMPERATURES: Final = FIELDS[-2:]
+"""Fields of the context, °C. What is no number is left out: no reading is lost to a sensor."""
 HIGHEST_NUMBER: Final = 2_147_483_647
 LONGEST_TEXT: Final = 128
 
@@ -47,7 +51,7 @@ class Form(NamedTuple):
         return self if unit is None else self._replace(scale=LENGTHS[unit], unit=unit)
 
     def value(self, field: str, value: Any) -> Any:
-        """The value of a field but ``characteristic``; None of a time that is none. Raises `Unreadable`, whose words go behind the value."""
+        """The value of a field but ``characteristic``; None of a time or a temperature that is none. Raises `Unreadable`, whose words go behind the value."""
         text = str(value).strip()
         if self.sheet:
             spreadsheet.refuse_error(text)
@@ -60,6 +64,8 @@ class Form(NamedTuple):
             if not isfinite(size * scale):
                 raise Unreadable("is not a number")
             return round(size * scale, 9)
+        if field in TEMPERATURES:
+            return self._degrees(text)
         if field in {"measured_at", "machined_at"}:
             at = self.together.moment(text, self.zone, self.times)
             return None if at is None else at.isoformat()
@@ -71,5 +77,20 @@ class Form(NamedTuple):
             raise Unreadable(f"is longer than {LONGEST_TEXT} characters" if text else "is empty")
         return text
 
+    def _degrees(self, text: str) -> float | None:
+        try:
+            degrees = number(text, self._decimal_in(text))
+        except Unreadable:
+            return None
+        return degrees if isfinite(degrees) else None
+
     def _decimal_in(self, text: str) -> str:
         return spreadsheet.decimal_in(text) if self.sheet else self.decimal
+
+
+def put(body: dict[str, Any], field: str, value: Any) -> None:
+    """Put a field into the body of a reading, where ``POST /readings`` has it."""
+    if field in TEMPERATURES:
+        body.setdefault("context", {})[field] = value
+    else:
+        body[field] = value

@@ -19,7 +19,7 @@ from typing import Any, Final, Literal, NamedTuple
 from msgspec import Struct
 
 from app.bridge.configuration import Machine, Positive
-from app.bridge.fields import EVERY, FIELDS, Form
+from app.bridge.fields import EVERY, FIELDS, Form, put
 from app.bridge.file_rows import Fault, Found, Table, cell_of, csv_rows, has, ndjson_rows, reasons, units_of
 from app.bridge.links import Received
 from app.bridge.patterns import LONGEST_LINE, Patterns, TooSlow, check_expressions
@@ -453,7 +453,7 @@ class _Reader:
                 if field_ == "key":
                     own = str(value)
                 elif (read := form.value(field_, value)) is not None:
-                    body[field_] = read
+                    put(body, field_, read)
             except Unreadable as error:
                 column = self.settings.columns.get(field_, field_ if name == EVERY or "measured" in fields else name)
                 self._fault(line, column, f"{error}.", str(value)[:40])

@@ -5,7 +5,7 @@ import json
 from collections.abc import Iterator, Mapping
 from typing import Any, Final, NamedTuple
 
-from app.bridge.fields import EVERY, Form
+from app.bridge.fields import EVERY, Form, put
 from app.bridge.json_text import read_json
 from app.files.formats.cell_values import Unreadable
 from app.files.formats.units import UnknownUnit, beside, unit_in
@@ -163,7 +163,7 @@ def _mapped(
                 if field not in {"characteristic", "unit", "key"}:
                     wrong = f"{field} = {json.dumps(value, ensure_ascii=False)[:40]}"
                     if (read := own.value(field, "" if value is None else value)) is not None:
-                        body[field] = read
+                        put(body, field, read)
         except (Unreadable, UnknownUnit) as error:
             words = error if isinstance(error, Unreadable) else f"{error.word}, in the name of the member, is no length"
             yield Found(None, None, {}, f"{wrong} {words}.")

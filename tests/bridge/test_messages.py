@@ -81,3 +81,12 @@ def test_what_is_no_reading_is_said(content: object, fields: dict[str, str], wor
     [found] = foreign(content, fields)
     assert found.fault is not None
     assert words in found.fault
+
+
+@pytest.mark.parametrize(
+    ("sent", "context"), [(24.5, {"part_temperature": 24.5}), ("24.5", {"part_temperature": 24.5}), ("----", None)]
+)
+def test_a_temperature_is_a_circumstance_and_costs_no_reading(sent: object, context: object) -> None:
+    [found] = foreign({"v": 40.0, "id": 12, "t": sent}, {"measured": "v", "key": "id", "part_temperature": "t"})
+    assert found.fault is None
+    assert found.body.get("context") == context

@@ -17,7 +17,7 @@ from typing import Any, Literal
 
 from app.bridge import sources
 from app.bridge.configuration import Machine
-from app.bridge.fields import EVERY, Form
+from app.bridge.fields import EVERY, Form, put
 from app.bridge.links import Clock, ControlAway, LinkError, Misconfigured, Order, Outcome, Position, Received
 from app.bridge.patterns import LONGEST_LINE, Patterns, TooSlow, check_expressions
 from app.bridge.sources import Source, source_of
@@ -160,7 +160,7 @@ class TextLink:
                 if field in {"characteristic", "unit", "key"} or (value == "" and field != "measured"):
                     continue
                 if (read := form.value(field, value)) is not None:
-                    body[field] = read
+                    put(body, field, read)
         except Unreadable as error:
             return self._refused(line, f"{field} {value[:40]!r} {error}.")
         if "key" in fields:

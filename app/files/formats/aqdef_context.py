@@ -14,6 +14,8 @@ HIGHEST_NEST = 999_999
 _WITH_A_PLACE = {
     "K0001", "K0002", "K0004", "K0005", "K0006", "K0007", "K0008", "K0009", "K0010", "K0011", "K0012", "K0014", "K0053",
 }  # fmt: skip
+TEMPERATURES = {"part temperature, °C": "part_temperature", "machine temperature, °C": "machine_temperature"}
+"""Process parameters (K0011) that are fields of the context, by their names in the catalogue."""
 _CONTROL = re.compile(r"[\x00-\x1f\x7f-\x9f]+")
 
 
@@ -48,6 +50,8 @@ def context_of(
     if process is None:
         further["K0011"] = read.process
         remark("K0011", read.process, _("is not written as number/value; it is kept as a text"))
+    sizes = {fit("K0011", named(number, "K4243", "K4242")) or "0": size for number, size in (process or {}).items()}
+    temperatures = {name: sizes.pop(each) for each, name in TEMPERATURES.items() if each in sizes}
     found = {
         "order": fit("K0053", read.order),
         "batch": fit("K0006", read.batch),
@@ -57,9 +61,7 @@ def context_of(
         "gauge": fit("K0012", named(read.gauge, "K4073", "K4072")),
         "comment": fit("K0009", read.text, LONGEST_COMMENT),
         "events": [text for each in read.events if (text := fit("K0005", named(each, "K4223", "K4222")))],
-        "process": {
-            fit("K0011", named(number, "K4243", "K4242")) or "0": size for number, size in (process or {}).items()
-        },
+        "process": sizes,
         "fields": {name: fitted for name, text in further.items() if (fitted := fit(name, text, LONGEST_COMMENT))},
     }
-    return {name: each for name, each in found.items() if each}
+    return {name: each for name, each in found.items() if each} | temperatures

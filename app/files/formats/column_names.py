@@ -61,4 +61,12 @@ NAMES: dict[str, tuple[str, ...]] = {
     "correction_in_effect": ("correction in effect",),
     "touches": ("touches",),
     "context": ("context",),
+    "part_temperature": (
+        "part temperature", "part temp", "workpiece temperature", "teiltemperatur", "werkstucktemperatur",
+        "temperatura dela", "temperatura obratka", "temperatura obdelovanca", "температура детали",
+    ),
+    "machine_temperature": (
+        "machine temperature", "machine temp", "maschinentemperatur", "temperatura masine", "temperatura stroja",
+        "температура станка",
+    ),
 }  # fmt: skip

@@ -17,6 +17,7 @@ from app.core.decision.limits import Zone
 from app.core.parameters import Parameters
 from app.core.period import ALWAYS, Period
 from app.errors import Invalid, NotFound
+from app.files.formats.aqdef_context import TEMPERATURES
 from app.files.formats.aqdef_writer import Catalogues, Described, Outcome, Part, Validity, Written, write
 from app.language.i18n import _
 from app.language.times import plant_zone
@@ -141,7 +142,7 @@ def _values(session: Session, of: _Of, *, period: Period, last: int | None) -> I
             operator=context.get("operator") or "",
             machine=context.get("machine") or machine.key,
             gauge=context.get("gauge") or machine.key,
-            process=_process(context.get("process") or {}, row, offsets),
+            process=_process(context, row, offsets),
             comment=context.get("comment") or "",
             fields={name: text for name, text in kept.items() if name not in OF_THE_READING}
             | {GUID: guid_of(row["sequence"], row["received_at"])},
@@ -166,8 +167,9 @@ def _events(row: dict[str, Any], *, changed: bool) -> list[str]:
     return [*events, EXCLUDED] if row["excluded"] is not None else events
 
 
-def _process(as_it_came: dict[str, float], row: dict[str, Any], offsets: dict[int, float]) -> dict[str, float]:
-    process = {name: value for name, value in as_it_came.items() if name != EMPIRICAL}
+def _process(context: dict[str, Any], row: dict[str, Any], offsets: dict[int, float]) -> dict[str, float]:
+    process = {name: value for name, value in (context.get("process") or {}).items() if name != EMPIRICAL}
+    process |= {each: context[name] for each, name in TEMPERATURES.items() if name in context}
     number = row["correction_in_effect"]
     if number is not None:
         process[NUMBER] = float(number)

@@ -9,18 +9,22 @@ import msgspec
 from sqlalchemy import select, text
 from sqlalchemy.orm import Session
 
+from app.core.decision.limits import Zone
 from app.core.decision.step import DECIMALS
 from app.core.period import ALWAYS, Period
+from app.core.temperature import AtReference
 from app.core.variants import Results
 from app.db.period import in_period
 from app.files.formats.delimited import defused
 from app.language.times import local
 from app.loop.characteristics.queries import parameters_of
+from app.loop.expansion.queries import at_20, expansion_of, temperatures_of
 from app.loop.readings.by_hand import queries as by_hand
 from app.loop.readings.by_hand.wording import verdict_of
 from app.loop.readings.records import Entry
 from app.loop.tables.readings import Exclusion, Reading, ReadingContext, ReadingResults, ReadingTouches
 
+TEMPERATURES = ("part_temperature", "machine_temperature", "size_at_20")  # °C, mm
 COLUMNS = (
     "sequence",
     "measured_at",
@@ -45,6 +49,7 @@ COLUMNS = (
     *Results._fields,
     "hand_measured",
     "hand_verdict",
+    *TEMPERATURES,
 )
 OF_READING = COLUMNS[: COLUMNS.index("excluded")]
 MADE_OF = {"decided_deviation": "decided", "corrected_size": "deviation"}
@@ -115,9 +120,10 @@ def rows(
     # Anyone who reads the file may be slow.
     session.execute(text("SET LOCAL idle_in_transaction_session_timeout = 0"))
     targets: dict[int, float] = {}
+    expansion = expansion_of(session, entry.machine_id, entry.characteristic_id)
     with session.execute(query.execution_options(yield_per=AT_ONCE)) as fetched:  # closed too where the file is cut off
         for *values, good, touches, context in fetched:
-            row = dict(zip(COLUMNS, (*values, verdict_of(good)), strict=True)) | {
+            row = dict(zip(COLUMNS, (*values, verdict_of(good)), strict=False)) | {
                 "touches": touches,
                 "context": context,
             }
@@ -125,7 +131,11 @@ def rows(
             if version not in targets:
                 targets[version] = parameters_of(session, entry.machine_id, entry.characteristic_id, version).target
             # Target + deviation, mm: the size as the drawing counts it.
-            yield row | {"corrected_size": round(targets[version] + row["deviation"], DECIMALS)}
+            size = round(targets[version] + row["deviation"], DECIMALS)
+            found = None if row["zone"] == Zone.PROBE_FAULT else at_20(size, context, expansion)
+            at = found.size if isinstance(found, AtReference) else None
+            beside = dict(zip(TEMPERATURES, (*temperatures_of(context), at), strict=True))
+            yield row | beside | {"corrected_size": size}
 
 
 class Ends:
@@ -166,10 +176,10 @@ def _cell(value: Any) -> Any:
 
 
 def write_ndjson(readings: Iterator[dict[str, Any]], file: TextIO) -> int:
-    """One JSON object per line, with the touches and the context of those that have them. The number of rows."""
+    """One JSON object per line, with touches, context and temperatures of those that have them. The number of rows."""
     count = 0
     for row in readings:
-        for name in ("touches", "context"):
+        for name in ("touches", "context", *TEMPERATURES):
             if row[name] is None:
                 del row[name]
         file.write(msgspec.json.encode(row).decode() + "\n")

@@ -30,6 +30,9 @@ def set_up(admin: Client, machine: plant.Machine) -> None:
         path = f"/characteristics/{feature.key}/control-plan"
         if feature.plan and admin.get(path)["since"] is None:
             admin.call("PUT", path, json=feature.plan | {"reason": "As the customer asks for"})
+        path = f"/characteristics/{feature.key}/expansion"
+        if feature.expansion and admin.get(path)["changed_at"] is None:
+            admin.call("PUT", path, json=feature.expansion | {"reason": "16MnCr5, sensor in the jaws"})
 
     for tool in machine.tools:
         path = f"/machines/{machine.key}/tools/{tool.number}"

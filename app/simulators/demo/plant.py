@@ -47,6 +47,7 @@ class Feature:
     shape: tuple[float, ...] = ()  # how far each point lies from the size: run-out, out-of-roundness, taper
     more: dict[str, Any] = field(default_factory=dict)  # parameters beyond these
     plan: dict[str, Any] = field(default_factory=dict)  # how often it is measured
+    expansion: dict[str, float] = field(default_factory=dict)  # of the part; its readings then carry its temperature
     skipped: tuple[int, int] = (0, 0)  # from this live part on until before that one the probe is switched off
 
     @property
@@ -128,7 +129,7 @@ LATHE_1 = Machine(
         Feature(
             "shaft-l120", "Shoulder length 120", 7, LENGTH, 120.0, 0.025, -0.025, factor=-1,
             average_memory=6, weighting_factor=3, zero_range=0.003, scatter=0.0022, warmth=0.022,
-            more={"axis": "Z", "direction": "negative"},
+            more={"axis": "Z", "direction": "negative"}, expansion={"coefficient": 11.5, "temperature_uncertainty": 0.5},
         ),
     ),
     first_chip=(12, 7),

@@ -23,6 +23,7 @@ WARM_UP = 45 * 60.0  # s, time constant while cutting
 COOL_DOWN = 80 * 60.0
 RUN_IN = 20.0  # parts
 STEEP_END = 0.85  # of the life of an edge: from there on it wears twice as fast
+COLD, WARMER = 21.0, 5.5  # °C of a part of the cold machine, and how much warmer those of the warm one are
 SHIFT = 4 * 3600.0  # s of work between two breaks
 BREAK = 25 * 60.0
 NIGHT = 24 * 3600.0 - 2 * SHIFT - BREAK  # after two of them
@@ -72,6 +73,7 @@ class Part:
     due: int  # measured after this part was cut
     sizes: dict[str, float]
     in_effect: dict[str, int]
+    temperature: float  # °C, as its sensor shows it
 
 
 @dataclass(frozen=True)
@@ -128,7 +130,7 @@ class Machine:
         due = self.serial + self._probing.randint(*self.spec.pipeline)
         if self.pipeline:
             due = max(due, self.pipeline[-1].due)
-        self.pipeline.append(Part(self.serial, self.at, due, sizes, in_effect))
+        self.pipeline.append(Part(self.serial, self.at, due, sizes, in_effect, round(COLD + WARMER * self.theta, 1)))
         for edge in self.edges.values():
             edge.parts += 1
         self._incident()

@@ -10,10 +10,12 @@ from typing import NamedTuple
 
 from sqlalchemy.orm import Session
 
-from app.core.decision.limits import classify
+from app.core.decision.limits import Zone, classify
+from app.core.temperature import AtReference, at_reference
 from app.language.i18n import _
 from app.language.numbers import grouped
 from app.loop.characteristics.queries import CurrentCharacteristic, parameters_of
+from app.loop.expansion.queries import expansion_of, temperatures_between
 from app.loop.readings import queries as readings
 from app.loop.summaries import queries as statistics
 from app.loop.summaries.queries import ChartData, ChartReading, Window
@@ -85,6 +87,24 @@ def chart_of(session: Session, current: CurrentCharacteristic, window: Window) -
         sizes=_size_axis(session, current, course),
         left_out=_left_out(session, current, course, steps, hands),
     )
+
+
+def at_20_of(session: Session, current: CurrentCharacteristic, points: Sequence[Point]) -> dict[int, float]:
+    """Deviations at 20 °C (mm) of these readings, of those that have one, by their numbers."""
+    expansion = expansion_of(session, current.machine.id, current.characteristic.id)
+    if expansion.coefficient is None or not points:
+        return {}
+    known = temperatures_between(session, current.characteristic, points[0].sequence, points[-1].sequence)
+    found = {
+        point.sequence: (point, at_reference(point.size, *known[point.sequence], expansion))
+        for point in points
+        if point.sequence in known and point.size is not None and point.zone != Zone.PROBE_FAULT
+    }
+    return {
+        sequence: round(point.deviation + at.correction, 9)
+        for sequence, (point, at) in found.items()
+        if isinstance(at, AtReference)
+    }
 
 
 def _left_out(

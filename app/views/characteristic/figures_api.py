@@ -12,7 +12,7 @@ from app.loop.characteristics.wording import result_label
 from app.loop.summaries import queries as statistics
 from app.loop.summaries.queries import Window
 from app.loop.timeline import queries as timeline
-from app.views.characteristic.chart import chart_of, results_of, run_of
+from app.views.characteristic.chart import at_20_of, chart_of, results_of, run_of
 from app.views.characteristic.figures import counting_edges, histogram_figure, result_figure, run_figure, zone_chart
 from app.web.api import FIGURE, CharacteristicKey, Theme, Width, api_router, chart_answer, problems
 from app.web.choice import Choice, Chosen
@@ -41,6 +41,9 @@ def get_zone_chart(
         Literal["zones", "true"], Query(description="Each band equally tall, or linear in µm around the tolerance.")
     ] = "zones",
     ringed: Annotated[int | None, Query(ge=1, le=LARGEST_ID, description="The reading with a ring about it.")] = None,
+    at_20: Annotated[
+        bool, Query(description="With the sizes at 20 °C of single readings that have one, as a second series.")
+    ] = False,
     theme: Theme = "light",
     width: Width = 1240,
 ) -> Response:
@@ -64,6 +67,7 @@ def get_zone_chart(
             width=width,
             ringed=ringed or ("newest" if window.reaches_now else None),
             left_out=chart.left_out,
+            at_20=at_20_of(session, current, chart.points) if at_20 else None,
         ),
         theme,
     )

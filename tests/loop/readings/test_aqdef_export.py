@@ -81,8 +81,8 @@ def test_what_was_written_is_imported_as_it_was(plant: Database, tmp_path: Path)
 CIRCUMSTANCES = [
     "K0100 1", "K1001 shaft-0815", "K2001/1 shaft-d40", "K2002/1 Seat", "K2142/1 mm",
     "K4062/1 M1", "K4062/2 M2", "K4063/2 Lathe", "K4092/1 EV", "K4093/1 Eva", "K4072/1 Probe",
-    "K4222/1 1", "K4223/1 tool changed", "K4222/2 2", "K4223/2 door opened", "K4243/1 temperature, °C",
-    F.join(["39,991", "0", "02.03.2026/06:00:00", "1,2", "#C1", "3", "1", "2", "1/21,5", "1"]),
+    "K4222/1 1", "K4223/1 tool changed", "K4222/2 2", "K4223/2 door opened", "K4243/1 temperature, °C", "K4243/2 part temperature, °C",
+    F.join(["39,991", "0", "02.03.2026/06:00:00", "1,2", "#C1", "3", "1", "2", "1/21.5,2/24.5", "1"]),
     "K0014/0 SN-1", "K0053/0 A-77", "K0009/1 chip, washed", "K0081/1 7",
     F.join(["39,992", "290", "02.03.2026/06:01:00", "", "#", "0", "0", "1", "", "0"]),
     F.join(["39,993", "0", "02.03.2026/06:02:00", "", "", "A", "", "0"]),
@@ -120,6 +120,7 @@ def test_the_circumstances_of_readings_are_kept_and_handed_on(database: Database
             "comment": "chip, washed",
             "events": ["tool changed", "door opened"],
             "process": {"temperature, °C": 21.5},
+            "part_temperature": 24.5,
             "fields": {"K0081": "7"},
         },
         {"machine": "M1", "fields": {"K0002": "290"}},

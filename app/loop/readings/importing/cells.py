@@ -27,6 +27,8 @@ SHOWN_LINES = 12
 SHOWN_CELL = 40
 AT_ONCE = 20_000  # items in memory before they are put down
 _OF_CHARACTERISTIC = {"characteristic", *DRAWN}
+TEMPERATURES = ("part_temperature", "machine_temperature")
+"""Columns that are circumstances of a reading, °C."""
 
 
 class Flaw(NamedTuple):
@@ -243,7 +245,17 @@ def _in_mm(values: dict[str, Any], layout: Layout, line: int, behind: str = "") 
             reason += _("; if this column holds no units, say so: --map unit=")
         return Flaw(line, column, "", reason)
     sizes = {name: in_mm(values[name], unit) for name in ("measured", "touches") if name in values}
-    return _with_origin(values | sizes)
+    return _with_origin(_with_temperatures(values | sizes))
+
+
+def _with_temperatures(values: dict[str, Any]) -> dict[str, Any]:
+    """The same with the temperatures of its columns in its context."""
+    stated = {name: values.pop(name) for name in TEMPERATURES if name in values}
+    stated = {name: value for name, value in stated.items() if value is not None}
+    context = values.get("context")
+    if stated and (context is None or isinstance(context, dict)):
+        values["context"] = stated | (context or {})
+    return values
 
 
 def _with_origin(values: dict[str, Any]) -> dict[str, Any]:
@@ -286,7 +298,7 @@ def _readers(layout: Layout) -> list[_Reader]:
         "received_at": lambda text: _or_none(text, zone),
         "touches": _touches,
         "context": _context,
-    }
+    } | dict.fromkeys(TEMPERATURES, lambda text: length(text) if text else None)
     columns = ((name, places) for name, places in layout.columns.items() if name not in _OF_CHARACTERISTIC)
     return [(name, places, kinds.get(name, lambda text: text or None)) for name, places in columns]
 

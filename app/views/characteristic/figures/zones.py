@@ -9,7 +9,7 @@ Nothing is only in a hover text: the list below the chart says everything too.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from datetime import datetime
 from math import fsum
@@ -72,6 +72,7 @@ def zone_chart(
     width: int = 1240,
     ringed: int | Literal["newest"] | None = "newest",
     left_out: Sequence[str] = (),
+    at_20: Mapping[int, float] | None = None,
 ) -> Chart:
     """The chart: readings, below them the lane of the corrections, above them that of the events.
 
@@ -80,6 +81,7 @@ def zone_chart(
     events: alarms, tool changes and others. hands: what was measured by hand. sizes: for the sizes at the left; without them deviations are there.
     width: of the chart in pixels, about: decides which words have room.
     ringed: the number of the reading with a ring about it; `newest` is the last one. left_out: words about what is not drawn.
+    at_20: the deviations at 20 °C of those readings that have one, mm, by their numbers.
     """
     ruler: Scale
     if scale == "zones":
@@ -100,6 +102,7 @@ def zone_chart(
         *limit_lines(limits, ruler),
         *envelope([*blocks, *_in_groups(points)], ruler.position, Limits.of(limits), extremes=blocks),
         *_average(blocks, points, ruler),
+        *_at_20(at_20 or {}, ruler),
         *_readings(points, ruler),
         *_ring(points, ringed, ruler),
         *hand_marks(hands, ruler),
@@ -212,6 +215,27 @@ def _readings(points: Sequence[Point], ruler: Scale) -> list[Series]:
             hover=[_hover(point) for point in points],
             links=[point.link for point in points],
             first=True,
+        )
+    ]
+
+
+def _at_20(deviations: Mapping[int, float], ruler: Scale) -> list[Series]:
+    """Sizes at 20 °C, beside the measured ones: nothing was decided by them."""
+    if not deviations:
+        return []
+    return [
+        Series(
+            list(deviations),
+            [ruler.position(deviation) for deviation in deviations.values()],
+            dots=Dots("diamond-open", 8 if len(deviations) <= MANY else 4, "average", "average"),
+            meta="at-20",
+            name=_("At 20 °C"),
+            hover=[
+                bold(_("Reading {n}").format(n=number))
+                + "<br>"
+                + _("at 20 °C {deviation}; nothing was decided by it").format(deviation=um(deviation, 2))
+                for number, deviation in deviations.items()
+            ],
         )
     ]
 
