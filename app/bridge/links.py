@@ -127,12 +127,16 @@ STOPPING: frozenset[str] = frozenset({"hold", "stop"})
 
 @dataclass(frozen=True, slots=True)
 class Decided:
-    """The server's decision on a reading. key, characteristic: of the reading; reason: a code, such as ``probe_fault``."""
+    """The server's decision on a reading. key, characteristic: of the reading; reason: a code, such as ``probe_fault``.
+
+    measure_next: the part to measure next, counted from this one, where a control plan says so.
+    """
 
     key: str
     characteristic: str
     action: str
     reason: str = ""
+    measure_next: int | None = None
 
 
 @dataclass(slots=True)

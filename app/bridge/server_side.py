@@ -154,7 +154,7 @@ async def _decided(unit: Unit, pairs: Sequence[tuple[Waiting, Decision]]) -> Non
     if not carries_decisions(unit.link):
         return
     decided = [
-        Decided(row.key, decision.characteristic, decision.action, decision.reason.code)
+        Decided(row.key, decision.characteristic, decision.action, decision.reason.code, decision.measure_next)
         for row, decision in pairs
         if not row.again
     ]

@@ -9,7 +9,7 @@ A tool change or an alarm asks for every part from its moment on: parts that wer
 """
 
 from collections import Counter
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 from itertools import pairwise
@@ -18,6 +18,8 @@ from typing import NamedTuple
 
 from app.core.affected import names_between
 
+MISSED_ALARM = "measurement_missed"
+"""The kind of alarm that asks for no more measurements than the plan itself."""
 PAUSE = 15 * 60.0
 """Seconds without a reading of the part, beyond which the machine is not known to have run."""
 
@@ -66,7 +68,12 @@ class Plan:
     @property
     def asks(self) -> bool:
         """Tell if it asks for anything."""
-        return bool(self.every or self.minutes or self.per_shift or self.after_change or self.after_alarm)
+        return bool(self.counts_parts or self.minutes or self.per_shift)
+
+    @property
+    def counts_parts(self) -> bool:
+        """Tell if it says of parts which one is to be measured."""
+        return bool(self.every or self.after_change or self.after_alarm)
 
 
 class Moment(NamedTuple):
@@ -134,6 +141,23 @@ def rhythm(plan: Plan, events: Iterable[Event] = ()) -> Rhythm:
         return Rhythm(plan.every)
     alarm = any(event.why is Tightened.ALARM for event in hold)
     return Rhythm(1, Tightened.ALARM if alarm else Tightened.TOOL_CHANGE, min(event.at for event in hold))
+
+
+def measure_next(plan: Plan, since: Mapping[Tightened, int | None], *, late: bool, measured: bool) -> int | None:
+    """Parts until the one to measure, counted from the part of a reading that comes now (1: the next one).
+
+    None: parts do not count, or it is `late`, measured before a reading that has come already: that one has said it. since:
+    readings from an event on, this one included; None: there was none. measured: False of a probe fault, which is no measurement.
+
+    >>> plan = Plan(every=5, after_alarm=2)
+    >>> [measure_next(plan, {Tightened.ALARM: since}, late=False, measured=True) for since in (None, 0, 1, 2)]
+    [5, 1, 1, 5]
+    """
+    events = (Event(why, 0.0, readings) for why, readings in since.items() if readings is not None)
+    every = rhythm(plan, events).every
+    if every is None or late:
+        return None
+    return every if measured else 1
 
 
 def in_time(moments: Iterable[tuple[int, Moment]], begin: tuple[int, Moment]) -> list[tuple[int, Moment]]:

@@ -28,6 +28,7 @@ APPEND_ONLY = frozenset(
         "reaction_plan",
         "reading",
         "reading_context",
+        "reading_next",
         "reading_results",
         "reading_summary",
         "reading_touches",

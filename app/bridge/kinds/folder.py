@@ -150,8 +150,9 @@ class Folder:
         try:
             if decided.action != "stop" and place.exists():
                 return
-            new = place.with_name(f"{place.name}.new")
-            write_new(new, json.dumps(asdict(decided)).encode())
+            new, content = place.with_name(f"{place.name}.new"), asdict(decided)
+            del content["measure_next"]  # the file says stop or hold, and nothing in between
+            write_new(new, json.dumps(content).encode())
             new.replace(place)
         except OSError as error:
             raise ControlAway(

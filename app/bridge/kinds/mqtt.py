@@ -432,6 +432,7 @@ class MqttLink:
                         "characteristic": each.characteristic,
                         "action": each.action,
                         "reason": each.reason,
+                        "measure_next": each.measure_next,
                     },
                 )
                 for each in decided

@@ -192,7 +192,8 @@ class Decision:
 
     action: `none`; `correct`: apply `correction` if its status is `pending`; `hold`: a person decides; `stop`: stop the
     machine. zone: `zero`, `average`, `full`, `oversize`, `undersize`, `wear`, `probe_fault`. deviation: raw; decided_deviation:
-    what it would have been with the corrections that were `outstanding` when the part was cut.
+    what it would have been with the corrections that were `outstanding` when the part was cut. measure_next: by the control plan
+    the part to measure next, counted from this one, 1: the next part; None: no plan counts parts, or the reading is late.
     """
 
     characteristic: str
@@ -216,6 +217,7 @@ class Decision:
     correction: Correction | None = None
     alarms: tuple[Alarm, ...] = ()
     parameters_version: int | None = None
+    measure_next: int | None = None
     extra: Mapping[str, Any] = field(default_factory=dict, repr=False)
 
 

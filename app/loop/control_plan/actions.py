@@ -17,9 +17,9 @@ from app.loop.control_plan import queries
 from app.loop.control_plan.alarm_kinds import MISSED
 from app.loop.control_plan.queries import Look
 from app.loop.control_plan.schemas import ControlPlanIn
-from app.loop.control_plan.tables import ControlPlan, MissedMeasurement
 from app.loop.machines.queries import lock_machines
 from app.loop.tables.characteristics import Characteristic
+from app.loop.tables.control_plan import ControlPlan, MissedMeasurement
 from app.loop.tables.machines import Machine
 from app.loop.tables.readings import Stream
 
@@ -30,7 +30,7 @@ def set_plan(session: Session, key: str, given: ControlPlanIn, caller: Caller) -
     """Set the plan of a characteristic: it counts from now on, and what was missed under the old one ends. Raises `NotFound`."""
     current = characteristic_named(session, key)
     machine, characteristic = current.machine, current.characteristic
-    lock_machines(session, [machine.id])
+    state = lock_machines(session, [machine.id])[machine.id]
     row = queries.plan_of(session, current)
     before, after = queries.stated(row), given.plan
     if row is not None and before == after:
@@ -43,6 +43,7 @@ def set_plan(session: Session, key: str, given: ControlPlanIn, caller: Caller) -
     row.changed_by, row.reason, row.since = caller.name, given.reason, datetime.now(UTC)
     row.seen = session.get_one(Stream, (machine.id, characteristic.id), populate_existing=True).sequence
     session.flush()
+    state.planned = queries.any_counts_parts(session, machine.id)
     _end(session, row, machine.key, key, by=caller.name, comment=given.reason, outcome={"code": "plan_changed"})
     changes = {name for name, value in _fields(after).items() if value != getattr(before, name)}
     record(

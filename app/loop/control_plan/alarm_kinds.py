@@ -1,5 +1,6 @@
 """Alarm kind of measurements that a control plan asks for and that were not made. The next reading ends it."""
 
+from app.core.control_plan import MISSED_ALARM
 from app.language.i18n import _, ngettext
 from app.loop.alarms.kinds import AlarmKind, register
 from app.loop.control_plan.wording import asked
@@ -27,7 +28,7 @@ def _sentence(alarm: Alarm) -> str:
 
 MISSED = register(
     AlarmKind(
-        "measurement_missed",
+        MISSED_ALARM,
         word=lambda: _("Measurement missed"),
         sentence=_sentence,
         what_to_do=lambda: _(

@@ -6,7 +6,7 @@ from datetime import UTC, datetime, timedelta
 from itertools import pairwise
 from typing import NamedTuple
 
-from sqlalchemy import ColumnElement, and_, func, or_, select, true
+from sqlalchemy import ColumnElement, and_, exists, func, or_, select, true
 from sqlalchemy.orm import Session
 
 from app.core.control_plan import (
@@ -26,7 +26,7 @@ from app.core.period import ALWAYS, Period
 from app.db.period import in_period
 from app.loop.characteristics.queries import CurrentCharacteristic
 from app.loop.control_plan import signs
-from app.loop.control_plan.tables import ControlPlan, MissedMeasurement
+from app.loop.tables.control_plan import ControlPlan, MissedMeasurement
 from app.loop.tables.characteristics import Characteristic
 from app.loop.tables.machines import Machine
 from app.loop.tables.readings import Stream
@@ -97,9 +97,17 @@ def planned(
 
 def asks() -> ColumnElement[bool]:
     """As `app.core.control_plan.Plan.asks`."""
-    columns = (ControlPlan.every, ControlPlan.minutes)
-    counts = (ControlPlan.after_change, ControlPlan.after_alarm)
-    return or_(ControlPlan.per_shift, *(one.is_not(None) for one in columns), *(one > 0 for one in counts))
+    return or_(counts_parts(), ControlPlan.minutes.is_not(None), ControlPlan.per_shift)
+
+
+def counts_parts() -> ColumnElement[bool]:
+    """As `app.core.control_plan.Plan.counts_parts`."""
+    return or_(ControlPlan.every.is_not(None), ControlPlan.after_change > 0, ControlPlan.after_alarm > 0)
+
+
+def any_counts_parts(session: Session, machine_id: int) -> bool:
+    """Tell if the plan of a characteristic of this machine says which part is to be measured."""
+    return bool(session.scalar(select(exists().where(ControlPlan.machine_id == machine_id, counts_parts()))))
 
 
 def look(session: Session, row: ControlPlan, now: datetime | None = None) -> Look:

@@ -7,8 +7,8 @@ from pydantic import BaseModel, Field
 
 from app.core.control_plan import Plan
 from app.loop.control_plan.queries import Look, MissedRow, stated
-from app.loop.control_plan.tables import ControlPlan
 from app.loop.control_plan.wording import due_word, plan_words, state_sentences
+from app.loop.tables.control_plan import ControlPlan
 from app.web.fields import Body, Reason
 
 Every = Annotated[int, Field(strict=True, ge=1, le=1000)]

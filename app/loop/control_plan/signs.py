@@ -15,7 +15,7 @@ from app.core.control_plan import Moment, Tightened
 from app.core.decision.step import Code
 from app.language.times import begin_of_shift
 from app.loop.control_plan.alarm_kinds import MISSED
-from app.loop.control_plan.tables import ControlPlan
+from app.loop.tables.control_plan import ControlPlan
 from app.loop.tables.alarms import Alarm
 from app.loop.tables.characteristics import Characteristic, ParametersVersion
 from app.loop.tables.readings import Reading, Stream

@@ -26,6 +26,7 @@ def answer(
     correction: tuple[int, float] | None,
     alarms: Iterable[tuple[int, str]],
     results: Results | None = None,
+    measure_next: int | None = None,
     touches: Touches | None = None,
 ) -> dict[str, Any]:
     """The answer to the machine. `correction` is (R10, amount in mm) of the one this reading led to.
@@ -66,6 +67,7 @@ def answer(
         "alarms": [{"id": number, "kind": kind} for number, kind in alarms],
         "reason": reason(record, parameters, correction[1] if correction else None, touches),
         "parameters_version": record.parameters_version,
+        "measure_next": measure_next,
     }
 
 
@@ -160,6 +162,13 @@ class ReadingAnswer(BaseModel):
     alarms: Annotated[list[RaisedAlarm], Field(description="Alarms that it raised or repeated.")]
     reason: WhySo
     parameters_version: Annotated[int, Field(description="Which version of the parameters it was judged by.")]
+    measure_next: Annotated[
+        int | None,
+        Field(
+            description="By the control plan in force then, the part to measure next, counted from this one: 1 is the next part, 5 "
+            "leaves out four. null: no plan counts parts, or the reading is late."
+        ),
+    ]
 
 
 class Excluded(BaseModel):

@@ -163,6 +163,7 @@ def answer_of(verdict: Verdict) -> dict[str, Any]:
         correction=(correction.tool_memory, correction.amount) if correction else None,
         alarms=[(alarm.id or 0, alarm.kind) for alarm in verdict.alarms],
         results=verdict.results,
+        measure_next=verdict.measure_next,
         touches=verdict.reading.touches,
     )
 

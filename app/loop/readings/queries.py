@@ -29,6 +29,7 @@ from app.loop.tables.readings import (
     HandMeasurement,
     Reading,
     ReadingContext,
+    ReadingNext,
     ReadingResults,
     ReadingTouches,
     ResultReading,
@@ -137,6 +138,7 @@ def answers(session: Session, entry: Entry, records: list[Record]) -> list[dict[
         )
     }
     results = _results(session, entry, [record.sequence for record in records])
+    following = _measure_next(session, entry, [record.sequence for record in records])
     touches = touches_of(session, entry, [record.sequence for record in records if record.code == Code.TOUCH_FAULT])
     return [
         answer(
@@ -148,6 +150,7 @@ def answers(session: Session, entry: Entry, records: list[Record]) -> list[dict[
             correction=corrections.get(record.correction) if record.correction is not None else None,
             alarms=[(number, kinds[number]) for number in record.alarms or () if number in kinds],
             results=results.get(record.sequence),
+            measure_next=following.get(record.sequence),
             touches=touches.get(record.sequence),
         )
         | {"excluded": excluded.get(record.sequence)}
@@ -165,6 +168,18 @@ def _results(session: Session, entry: Entry, sequences: list[int]) -> dict[int, 
         )
     )
     return {sequence: Results(*found) for sequence, *found in rows}
+
+
+def _measure_next(session: Session, entry: Entry, sequences: list[int]) -> dict[int, int]:
+    """Return the parts until the next measurement as these readings were answered, of those that a control plan counts parts for."""
+    rows = session.execute(
+        select(ReadingNext.sequence, ReadingNext.measure_next).where(
+            ReadingNext.machine_id == entry.machine_id,
+            ReadingNext.characteristic_id == entry.characteristic_id,
+            ReadingNext.sequence.in_(sequences),
+        )
+    )
+    return {sequence: parts for sequence, parts in rows}  # noqa: C416 - rows are no pairs to mypy
 
 
 def touches_of(session: Session, entry: Entry, sequences: Sequence[int]) -> dict[int, Touches]:

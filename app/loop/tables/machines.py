@@ -60,7 +60,8 @@ class MachineState(Base):
     """The lock of a machine, and the number of its last correction (gap-free per machine).
 
     version: moves whenever anything of the machine changes, so that the writer of readings knows whether what it has in
-    memory still is what the database holds.
+    memory still is what the database holds. planned: a characteristic of it has a control plan by parts, which readings are
+    answered by.
     """
 
     __tablename__ = "machine_state"
@@ -69,3 +70,4 @@ class MachineState(Base):
     machine_id: Mapped[int] = mapped_column(ForeignKey("machine.id"), primary_key=True, autoincrement=False)
     last_correction: Mapped[int] = mapped_column(server_default="0")
     version: Mapped[int] = mapped_column(BigInteger, server_default="0")
+    planned: Mapped[bool] = mapped_column(server_default="false")

@@ -194,6 +194,17 @@ class ReadingResults(Base):
     straightness: Mapped[float | None]
 
 
+class ReadingNext(Base):
+    """Parts until the next measurement, as a reading was answered (`measure_next`); only where a control plan counts parts."""
+
+    __tablename__ = "reading_next"
+
+    machine_id: Mapped[int] = mapped_column(primary_key=True, autoincrement=False)
+    characteristic_id: Mapped[int] = mapped_column(primary_key=True, autoincrement=False)
+    sequence: Mapped[int] = mapped_column(BigInteger, primary_key=True, autoincrement=False)
+    measure_next: Mapped[int]
+
+
 class HandMeasurement(Base):
     """Manual measurement of the part of a reading: a size, mm, or only whether it is good; `alarm` if entered there.
 

@@ -714,6 +714,7 @@ def test_a_stop_lies_in_a_file_until_somebody_removes_it(tmp_path: Path) -> None
     link = Folder(machine(tmp_path, decisions=str(place)))
     assert carries_decisions(link)
     assert [told("none"), told("hold"), told("none", "stop", "hold"), told("hold")] == [None, "hold", "stop", "stop"]
+    assert json.loads(place.read_text()).keys() == {"key", "characteristic", "action", "reason"}
     place.unlink()
     assert told("hold") == "hold"
     assert not carries_decisions(Folder(machine(tmp_path)))

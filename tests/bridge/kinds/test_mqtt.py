@@ -325,9 +325,11 @@ def test_decisions_are_published_and_the_list_is_in_the_order_of_the_numbers(tmp
                 for topic in ("decisions", "corrections"):
                     await client.subscribe(f"{TOPIC}/{topic}", qos=1)
                 messages = aiter(client.messages)
-                await there.decide([Decided("k1", "shaft-1", "stop", "probe_fault")])
+                await there.decide([Decided("k1", "shaft-1", "stop", "probe_fault", 1)])
                 told = json.loads(bytes((await anext(messages)).payload))
-                assert told == {"key": "k1", "characteristic": "shaft-1", "action": "stop", "reason": "probe_fault"}
+                assert told == {
+                    "key": "k1", "characteristic": "shaft-1", "action": "stop", "reason": "probe_fault", "measure_next": 1,
+                }  # fmt: skip
                 await there.offer([Order(7, 3, 0.01, 0.002), Order(5, 3, 0.0, 0.01)])
                 listed = json.loads(bytes((await anext(messages)).payload))["corrections"]
                 assert [each["number"] for each in listed] == [5, 7]

@@ -50,7 +50,7 @@ class TestZones:
                 "average_before",
                 "average_after",
             ),
-            *("action", "correction", "alarms", "reason", "parameters_version"),
+            *("action", "correction", "alarms", "reason", "parameters_version", "measure_next"),
         }
         assert datetime.fromisoformat(answer.pop("measured_at")) == datetime.fromisoformat(AT)
         assert abs(datetime.fromisoformat(answer.pop("received_at")) - datetime.now(UTC)) < timedelta(minutes=1)
@@ -78,6 +78,7 @@ class TestZones:
                 "notes": [],
             },
             "parameters_version": 1,
+            "measure_next": None,
         }
 
     def test_an_average_within_the_zero_range_is_kept(self, shop: Shop) -> None:

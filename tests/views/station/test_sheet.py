@@ -40,7 +40,9 @@ def sheet(shop: Shop, operator: Person) -> Sheet:
 
 def test_a_size_is_decided_as_a_reading_and_marked_by_hand(sheet: Sheet, operator: Person) -> None:
     shop, name = sheet.shop, sheet.shop.characteristic
+    shop.call("PUT", f"/characteristics/{name}/control-plan", every=5, reason="Agreed")
     said = sheet.send(sizes={name: "40,006"}, part="SN-7", order="A-77", gauge="Micrometer 4")
+    assert "Measure next: part 5 from here." in said
     assert "Stored, measured by hand" in said
     assert "Mark applied" in said
     stored = shop.call("GET", f"/readings/{name}/1")

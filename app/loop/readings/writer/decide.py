@@ -145,6 +145,8 @@ def decide_reading(pending: PendingWrites, entry: Entry, reading: ReadingIn, now
         results=results,
     )
     _move_along(verdict, course, jump=jump)
+    if pending.snapshot.plans:
+        verdict.measure_next = pending.measure_next(verdict)
     pending.touched[entry.characteristic_id] = stream
     pending.verdicts.append(verdict)
     if reading.key is not None:

@@ -10,6 +10,7 @@ from typing import Any
 
 import msgspec
 
+from app.core.control_plan import Plan
 from app.core.parameters import Parameters
 from app.db.pipeline import Pipeline, Step
 from app.loop.readings.records import Entry
@@ -17,12 +18,13 @@ from app.loop.readings.schemas import ReadingIn
 from app.loop.readings.writer.snapshot import (
     KnownKey,
     LoadedAverage,
+    LoadedPlan,
     LoadedStream,
     LoadedTool,
     NamedCorrection,
     Snapshot,
 )
-from app.loop.readings.writer.statements import LOAD, LOCK, PARAMETERS, array, as_json
+from app.loop.readings.writer.statements import LOAD, LOCK, PARAMETERS, PLANS, array, as_json
 
 ParametersCache = dict[tuple[int, int], Parameters]
 """Parameters by (characteristic, version). A version never changes, so they are kept for good."""
@@ -51,13 +53,16 @@ async def load(
     """
     machines = _machines(readings)
     opening = (*pipeline.begin, (LOCK, array(machines)))
-    await _load(pipeline, book, snapshot, readings, machines, opening, optimistic=optimistic)
+    planned = await _load(pipeline, book, snapshot, readings, machines, opening, optimistic=optimistic)
     if of_form := [
         (form, reading)
         for entry, reading in readings
         for form, _result in snapshot.streams[entry.characteristic_id].forms
     ]:
         await _load(pipeline, book, snapshot, of_form, machines, (), optimistic=optimistic)
+    if planned:
+        entries = {entry for entry, _ in (*readings, *of_form) if entry.machine_id in planned}
+        await _load_plans(pipeline, snapshot, entries)
 
 
 async def _load(
@@ -69,8 +74,11 @@ async def _load(
     opening: Sequence[Step],
     *,
     optimistic: bool,
-) -> None:
-    """Bring the state of these readings into the snapshot. opening: begins the transaction and locks; empty if that is done."""
+) -> set[int]:
+    """Bring the state of these readings into the snapshot; the machines of which a control plan counts parts.
+
+    opening: begins the transaction and locks; empty if that is done.
+    """
     entries = {entry.characteristic_id: entry for entry, _ in readings}
     document = {
         "streams": [{**e._asdict(), **machines[e.machine_id]} for e in entries.values()],
@@ -89,7 +97,7 @@ async def _load(
     *opened, ((text,),) = await pipeline.run((*opening, (LOAD, as_json(document))))
     locked = opened[-1] if opened else ()
     loaded = _loaded.decode(text or b"")
-    states = [(int(machine_id or 0), int(last or 0), int(version or 0)) for machine_id, last, version in locked]
+    states = [(int(machine or 0), int(last or 0), int(version or 0)) for machine, last, version, _planned in locked]
     if any(snapshot.versions.get(machine_id, version) != version for machine_id, _last, version in states):
         snapshot.forget()
     for machine_id, last, version in states:
@@ -110,6 +118,17 @@ async def _load(
     for c, key, sequence, measured, version in loaded.known or ():
         parameters = await _parameters(pipeline, book, entries[c], version)
         snapshot.stored_keys[c, key] = KnownKey(sequence, measured, parameters)
+    return {int(machine or 0) for machine, _last, _version, planned in locked if planned == b"t"}
+
+
+async def _load_plans(pipeline: Pipeline, snapshot: Snapshot, entries: Iterable[Entry]) -> None:
+    """Bring the control plans of these characteristics that count parts into the snapshot."""
+    asked = [{"machine_id": entry.machine_id, "characteristic_id": entry.characteristic_id} for entry in entries]
+    (rows,) = await pipeline.run(((PLANS, as_json(asked)),))
+    for row in rows:
+        c, every, after_change, after_alarm, changed, alarmed = (None if value is None else int(value) for value in row)
+        plan = Plan(every=every, after_change=after_change or 0, after_alarm=after_alarm or 0)
+        snapshot.plans[c or 0] = LoadedPlan(plan, changed, alarmed)
 
 
 def _machines(readings: Iterable[tuple[Entry, ReadingIn]]) -> dict[int, dict[str, Any]]:

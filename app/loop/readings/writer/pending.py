@@ -13,6 +13,7 @@ from typing import Any, NamedTuple
 from msgspec import structs
 
 from app.core.decision.decide import Decision
+from app.core.decision.limits import Zone
 from app.core.gain import LONGEST
 from app.core.parameters import Parameters
 from app.core.variants import Results
@@ -23,6 +24,7 @@ from app.loop.readings.writer.snapshot import (
     MOST_NAMED,
     LoadedAverage,
     LoadedCorrection,
+    LoadedPlan,
     LoadedStream,
     LoadedTool,
     NamedCorrection,
@@ -215,12 +217,13 @@ class PendingWrites:
     """Everything that the readings of one transaction come to.
 
     streams, tools, averages: taken out of the snapshot so far; `touched` are the streams with new readings. last_correction,
-    named: where they differ from the snapshot. column_rows: rows of the table `reading` for binary COPY that were laid out
+    named, plans: where they differ from the snapshot. column_rows: rows of the table `reading` for binary COPY that were laid out
     of columns, beside the verdicts.
     """
 
     snapshot: Snapshot
     streams: dict[int, PendingStream] = field(default_factory=dict)
+    plans: dict[int, LoadedPlan] = field(default_factory=dict)
     tools: dict[tuple[int, int], PendingTool] = field(default_factory=dict)
     averages: dict[tuple[int, int], PendingAverage] = field(default_factory=dict)
     last_correction: dict[int, int] = field(default_factory=dict)
@@ -279,6 +282,24 @@ class PendingWrites:
             )
         return tool
 
+    def measure_next(self, verdict: "Verdict") -> int | None:
+        """Return the parts until the next measurement, by the plan in force after this reading; its alarms count from here on."""
+        own, plans = verdict.stream.start, self.snapshot.plans
+        if verdict.alarms:
+            about = [own.entry.characteristic_id]
+            if any(
+                alarm.characteristic_id is None for alarm in verdict.alarms
+            ):  # about the tool, so about all that it cuts
+                streams, machine_id = self.snapshot.streams, own.entry.machine_id
+                about = [c for c in plans if (streams[c].entry.machine_id, streams[c].tool) == (machine_id, own.tool)]
+            for c in plans.keys() & about:
+                self.plans[c] = self.plans.get(c, plans[c])._replace(alarmed=self.stream(c).sequence)
+        plan = self.plans.get(own.entry.characteristic_id) or plans.get(own.entry.characteristic_id)
+        if plan is None:
+            return None
+        measured = verdict.decision.zone is not Zone.PROBE_FAULT
+        return plan.measure_next(verdict.sequence, late=verdict.late, measured=measured)
+
     def last_number(self, machine_id: int) -> int:
         """Return the number of the machine's last correction; 0 before the first."""
         number = self.last_correction.get(machine_id)
@@ -306,6 +327,7 @@ class PendingWrites:
                 snapshot.tools[tool.machine_id, tool.number] = self._settled(tool)
         for machine_id in {stream.entry.machine_id for stream in self.touched.values()}:
             snapshot.versions[machine_id] += 1
+        snapshot.plans |= self.plans
         snapshot.last_correction |= self.last_correction
         snapshot.named |= self.named
         if len(snapshot.named) > MOST_NAMED:
@@ -346,6 +368,7 @@ class Verdict:
     alarms: list[PendingAlarm]
     compensated: float | None
     results: Results | None = None
+    measure_next: int | None = None
     _record: Record | None = None
 
     def record(self) -> Record:

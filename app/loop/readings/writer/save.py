@@ -28,6 +28,7 @@ from app.loop.readings.writer.statements import (
     LOCK,
     MOVE_LEVELS,
     MOVE_TOOLS,
+    NEXT,
     RAISE,
     REPEAT,
     RESULTS,
@@ -170,6 +171,7 @@ def _beside_readings(verdicts: list[Verdict]) -> Iterable[tuple[str, list[Any]]]
     yield TOUCHES, [at(v) | {"touches": v.reading.touches} for v in verdicts if v.reading.touches is not None]
     yield CONTEXT, [at(v) | {"context": v.reading.context} for v in verdicts if v.reading.context is not None]
     yield RESULTS, [at(v) | v.results._asdict() for v in verdicts if v.results is not None]
+    yield NEXT, [at(v) | {"measure_next": v.measure_next} for v in verdicts if v.measure_next is not None]
     moved = {id(v.stream): v.stream for v in verdicts if v.stream.level_moved}.values()
     yield MOVE_LEVELS, [_place(s) | {"level": s.level, "level_sequence": s.level_sequence} for s in moved]
 

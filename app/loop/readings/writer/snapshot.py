@@ -11,6 +11,7 @@ from typing import NamedTuple
 
 import msgspec
 
+from app.core.control_plan import Plan, Tightened, measure_next
 from app.core.parameters import Parameters
 from app.core.variants import FormResult
 from app.loop.readings.records import Entry
@@ -106,6 +107,24 @@ class LoadedStream(msgspec.Struct, frozen=True, kw_only=True, array_like=True):
     forms: Sequence[tuple[Entry, FormResult]] = ()
 
 
+class LoadedPlan(NamedTuple):
+    """The control plan of a characteristic, where it counts parts.
+
+    changed, alarmed: its last reading before the tool was changed, and the last one that was before an alarm or raised it; None:
+    there was no such event.
+    """
+
+    plan: Plan
+    changed: int | None
+    alarmed: int | None
+
+    def measure_next(self, sequence: int, *, late: bool, measured: bool) -> int | None:
+        """As `app.core.control_plan.measure_next`, of the reading with this number."""
+        events = {Tightened.TOOL_CHANGE: self.changed, Tightened.ALARM: self.alarmed}
+        since = {why: None if at is None else sequence - at for why, at in events.items()}
+        return measure_next(self.plan, since, late=late, measured=measured)
+
+
 class KnownKey(NamedTuple):
     """A stored reading whose key has come again."""
 
@@ -118,11 +137,13 @@ class KnownKey(NamedTuple):
 class Snapshot:
     """Rows as the database holds them. Only `load`, and the end of a transaction, put others in their place.
 
-    Keys: characteristic; (machine, location); machine; (machine, correction); (characteristic, key of a reading).
+    Keys: characteristic; (machine, location); machine; (machine, correction); (characteristic, key of a reading). plans: of the
+    streams that have one.
     """
 
     parameters: dict[int, Parameters] = field(default_factory=dict)
     streams: dict[int, LoadedStream] = field(default_factory=dict)
+    plans: dict[int, LoadedPlan] = field(default_factory=dict)
     tools: dict[tuple[int, int], LoadedTool] = field(default_factory=dict)
     averages: dict[tuple[int, int], LoadedAverage] = field(default_factory=dict)
     last_correction: dict[int, int] = field(default_factory=dict)
@@ -152,5 +173,5 @@ class Snapshot:
 
     def forget(self) -> None:
         """Forget everything that was loaded; only keys of this transaction stay."""
-        self.parameters, self.streams, self.tools, self.averages = {}, {}, {}, {}
+        self.parameters, self.streams, self.plans, self.tools, self.averages = {}, {}, {}, {}, {}
         self.last_correction, self.versions, self.named = {}, {}, {}

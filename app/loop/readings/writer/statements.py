@@ -9,6 +9,7 @@ from typing import Any
 
 import msgspec
 
+from app.core.control_plan import MISSED_ALARM
 from app.core.decision.limits import Zone
 from app.core.gain import LONGEST
 from app.core.variants import Results
@@ -30,7 +31,7 @@ def array(numbers: Iterable[int]) -> str:
 
 
 LOCK = """
-SELECT machine_id, last_correction, version FROM machine_state
+SELECT machine_id, last_correction, version, planned FROM machine_state
 WHERE machine_id = ANY($1::int[]) ORDER BY machine_id FOR UPDATE
 """
 # Of these machines the ones that nobody holds.
@@ -149,6 +150,37 @@ SELECT p.parameters FROM json_to_record($1) AS w(machine_id int, characteristic_
 JOIN parameters_version p ON p.machine_id = w.machine_id AND p.characteristic_id = w.characteristic_id
     AND p.version = w.version
 """
+# Control plans that count parts, asked for only on machines that have any; the last reading before the tool change and the alarm
+# that `app.loop.control_plan.signs` finds. An alarm is looked for in as many readings as it asks for: history that was imported
+# meanwhile is none of them, so it errs to more measurements.
+PLANS = f"""
+SELECT p.characteristic_id, p.every, p.after_change, p.after_alarm,
+    CASE WHEN p.after_change > 0 AND (t.changed_at IS NOT NULL OR EXISTS (
+        SELECT FROM parameters_version v WHERE v.machine_id = s.machine_id AND v.characteristic_id = s.characteristic_id
+            AND (v.parameters ->> 'tool_memory')::int <> s.tool_memory
+    )) THEN s.sequence_at_tool_change END,
+    CASE WHEN a.number IS NOT NULL OR a.at IS NOT NULL THEN s.sequence - (
+        SELECT count(*) FROM reading r WHERE r.machine_id = s.machine_id AND r.characteristic_id = s.characteristic_id
+            AND r.sequence > greatest(s.sequence - p.after_alarm, a.number) AND r.code <> 'imported'
+            AND (a.at IS NULL OR r.received_at > a.at)
+    ) END
+FROM json_to_recordset($1) AS w(machine_id int, characteristic_id int)
+JOIN control_plan p ON p.machine_id = w.machine_id AND p.characteristic_id = w.characteristic_id
+JOIN stream s ON s.machine_id = w.machine_id AND s.characteristic_id = w.characteristic_id
+LEFT JOIN tool t ON t.machine_id = s.machine_id AND t.number = s.tool_memory
+LEFT JOIN LATERAL (
+    SELECT max(number) AS number, max(last_at) FILTER (WHERE number IS NULL) AS at FROM (
+        (SELECT coalesce(last_sequence, sequence) AS number, last_at FROM alarm
+        WHERE machine_id = s.machine_id AND characteristic_id = s.characteristic_id AND kind <> '{MISSED_ALARM}'
+        ORDER BY id DESC LIMIT 100)
+        UNION ALL
+        (SELECT NULL::bigint, last_at FROM alarm
+        WHERE machine_id = s.machine_id AND characteristic_id IS NULL AND tool_memory = s.tool_memory AND s.tool_memory > 0
+        ORDER BY id DESC LIMIT 100)
+    ) a
+) a ON p.after_alarm > 0
+WHERE p.every IS NOT NULL OR p.after_change > 0 OR p.after_alarm > 0
+"""  # noqa: S608 - made of constants
 ALARM_NUMBERS = "SELECT nextval('alarm_id') FROM generate_series(1, $1::int)"
 
 _READING = """machine_id int4, characteristic_id int4, sequence int8, measured float8, deviation float8, decided float8,
@@ -198,6 +230,10 @@ RESULTS = f"""
 INSERT INTO reading_results (machine_id, characteristic_id, sequence, {", ".join(Results._fields)})
 SELECT * FROM json_to_recordset($1) AS r({_RESULTS})
 """  # noqa: S608 - made of constants
+NEXT = """
+INSERT INTO reading_next (machine_id, characteristic_id, sequence, measure_next)
+SELECT * FROM json_to_recordset($1) AS r(machine_id int, characteristic_id int, sequence bigint, measure_next int)
+"""
 COUNTERS = """
 UPDATE machine_state m SET last_correction = n.last_correction
 FROM json_to_recordset($1) AS n(machine_id int, last_correction int) WHERE m.machine_id = n.machine_id

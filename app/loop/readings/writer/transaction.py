@@ -69,7 +69,7 @@ async def transact(
         and optimistic
         and len(readings) >= FEWEST
         and _keys_differ(readings)
-        and not any(snapshot.streams[number].forms for number in {entry.characteristic_id for entry, _ in readings})
+        and not any(_one_by_one(snapshot, number) for number in {entry.characteristic_id for entry, _ in readings})
     )
     decide_all = decide_in_columns if columnar else decide_one_by_one
     pending = PendingWrites(snapshot)
@@ -96,6 +96,11 @@ async def transact(
 def _examples(readings: Sequence[tuple[Entry, ReadingIn]]) -> list[tuple[Entry, ReadingIn]]:
     """Return one reading for each state that readings ask for; their keys are new."""
     return list({(e.characteristic_id, r.correction_in_effect, r.machined_at): (e, r) for e, r in readings}.values())
+
+
+def _one_by_one(snapshot: Snapshot, characteristic_id: int) -> bool:
+    """Tell if readings of a characteristic bring more with them than their own row."""
+    return characteristic_id in snapshot.plans or bool(snapshot.streams[characteristic_id].forms)
 
 
 def _keys_differ(readings: Sequence[tuple[Entry, ReadingIn]]) -> bool:
