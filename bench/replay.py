@@ -49,7 +49,7 @@ def uncompiled(trace: ProcessTrace, policy: Policy) -> ReplayResult:
     result: list[Any] = [column.tolist() for column in ReplayResult.room(len(trace.free))]
     lanes: Any = [SimpleNamespace(**dict(zip(LANE.names or (), lane.row(), strict=True))) for lane in policy.lanes]
     tally = SimpleNamespace(**dict.fromkeys(TALLY.names or (), 0))
-    plain(loops.follow)(ProcessTrace(*columns), lanes, policy.delay, ReplayResult(*result), tally)
+    plain(loops.follow)(ProcessTrace(*columns), lanes, policy.delay, loops.EVERY_PART, ReplayResult(*result), tally)
     return ReplayResult(*map(np.array, result))
 
 

@@ -24,8 +24,10 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from app.core.control_plan import Plan
 from app.core.decision.limits import nanometres
 from app.core.decision.loops import (
+    EVERY_PART,
     LANE,
     TALLY,
     Floats,
@@ -109,6 +111,19 @@ class Figures(NamedTuple):
         return self.oversize + self.undersize + self.worn + self.faults + self.offset_limit
 
 
+class Sampled(NamedTuple):
+    """A replay in which 1 in `every` parts is measured, and every part for a while after a fresh edge and after an alarm.
+
+    figures: mean, spread, Ppk, largest and rejects are of all parts; corrections and alarms of those that were measured. escaped:
+    rejects that were not measured.
+    """
+
+    every: int
+    measured: int
+    escaped: int
+    figures: Figures
+
+
 def rebuilt(deviation: Floats, compensated: Floats, factor: float | Floats, effect: float = 1.0) -> Floats:
     """The deviations that the parts would have had without any correction since the tool change. factor: of all, or of each.
 
@@ -170,7 +185,7 @@ def run(trace: ProcessTrace, policy: Policy) -> tuple[ReplayResult, Figures]:
     """Follow the loop, compiled: each reading, and what they amount to."""
     result = ReplayResult.room(len(trace.free))
     tally = np.zeros(1, TALLY)
-    follow(trace, rows_of([policy])[0], policy.delay, result, tally[0])
+    follow(trace, rows_of([policy])[0], policy.delay, EVERY_PART, result, tally[0])
     return result, _figures(tally[0], _counted(policy))
 
 
@@ -179,8 +194,31 @@ def figures_of(trace: ProcessTrace, policies: Sequence[Policy]) -> list[Figures]
     if not policies:
         return []
     tallies = np.zeros(len(policies), TALLY)
-    follow_each(trace, rows_of(policies), policies[0].delay, ReplayResult.room(0), tallies)
+    samplings = np.tile(EVERY_PART, (len(policies), 1))
+    follow_each(trace, rows_of(policies), policies[0].delay, samplings, ReplayResult.room(0), tallies)
     return [_figures(tally, _counted(policy)) for tally, policy in zip(tallies, policies, strict=True)]
+
+
+def sampled(trace: ProcessTrace, policy: Policy, plans: Sequence[Plan]) -> list[Sampled]:
+    """The same policy where 1 in N parts is measured, by each of these plans; the other lanes are measured as they were.
+
+    Of a plan its parts count: minutes and shifts are not replayed. A fresh edge is each `Mark.BEGIN`.
+    """
+    if not plans:
+        return []
+    tallies = np.zeros(len(plans), TALLY)
+    samplings = np.array([(plan.every or 1, plan.after_change, plan.after_alarm) for plan in plans], np.int64)
+    follow_each(trace, rows_of([policy] * len(plans)), policy.delay, samplings, ReplayResult.room(0), tallies)
+    counted = _counted(policy)
+    return [
+        Sampled(
+            plan.every or 1,
+            int(tally["measured"]),
+            0 if counted.feature is Feature.TOOL else int(tally["escaped"]),
+            _figures(tally, counted),
+        )
+        for plan, tally in zip(plans, tallies, strict=True)
+    ]
 
 
 def rows_of(policies: Sequence[Policy]) -> Rows:
@@ -198,6 +236,7 @@ def _figures(tally: Any, parameters: Parameters) -> Figures:
     if parameters.feature is Feature.TOOL:
         number["rejects"] = 0
     total, squares, largest, sizes = (number.pop(name) for name in ("sum", "squares", "largest", "sizes"))
+    del number["measured"], number["escaped"]
     inner, corrections = number["inner"], number["corrections"]
     mean = total / inner if inner else None
     spread = ppk = None

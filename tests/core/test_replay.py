@@ -7,8 +7,9 @@ import numpy as np
 import pytest
 from hypothesis import given
 
+from app.core.control_plan import Plan, Tightened, measure_next
 from app.core.decision.decide import LoopState, ReadingAlarm, decide
-from app.core.decision.limits import ZONES
+from app.core.decision.limits import ZONES, in_nanometres
 from app.core.decision.loops import Mark, ProcessTrace, ReplayResult, _rounded
 from app.core.decision.step import CODES, Code
 from app.core.parameters import Feature, Mode, Parameters, WearPolicy
@@ -20,6 +21,7 @@ from app.core.replay import (
     parts_of,
     rebuilt,
     run,
+    sampled,
     without_events,
 )
 from bench.replay import followed
@@ -263,6 +265,52 @@ def test_equal_readings_have_no_ppk() -> None:
     _result, figures = run(without_events(np.full(50, 0.0004)), Policy((ReplayedCharacteristic(SEAT, 1.0),)))
     assert (figures.ppk, figures.corrections) == (None, 0)
     assert figures.spread == pytest.approx(0, abs=1e-12)
+
+
+@given(traces(), st.integers(2, 5), st.integers(0, 4), st.integers(0, 4))
+@examples(60)
+def test_what_is_measured_of_1_in_n_is_what_the_answers_would_have_said(
+    given_: tuple[ProcessTrace, Policy], every: int, after_change: int, after_alarm: int
+) -> None:
+    """By the rule that readings are answered by, on a process that nothing corrects: there each part is what it is."""
+    trace, policy = given_
+    trace.marks[:] &= Mark.BEGIN
+    quiet = policy.with_(lambda parameters: replace(parameters, mode=Mode.MEASURE_ONLY, feature=Feature.OUTSIDE))
+    lanes = tuple(lane._replace(parameters=quiet.lanes[0].parameters, counts=True, memory=-1) for lane in quiet.lanes)
+    plan = Plan(every=every, after_change=after_change, after_alarm=after_alarm)
+    result, whole = run(trace, Policy(lanes))
+    every_part, few = sampled(trace, Policy(lanes), [replace(plan, every=1), plan])
+    assert (every_part.measured, every_part.escaped, every_part.figures) == (whole.readings, 0, whole)
+    limits = lanes[0].parameters.limits
+    measured, escaped, due = 0, 0, 1
+    since: dict[Tightened, int | None] = {}
+    for deviation, zone, mark in zip(result.deviation, result.zone, trace.marks, strict=True):
+        due -= 1
+        if mark & Mark.BEGIN and after_change:
+            since[Tightened.TOOL_CHANGE], due = 0, 0
+        size = abs(in_nanometres(deviation))
+        bad = size > limits.tolerance
+        if due > 0:
+            escaped += bool(bad and size < limits.confidence)
+            continue
+        since = {why: (count or 0) + 1 for why, count in since.items()}
+        measured += 1
+        if bad or ZONES[zone] in {"wear", "probe_fault"}:
+            since[Tightened.ALARM] = 0
+        due = measure_next(plan, since, late=False, measured=ZONES[zone] != "probe_fault") or 1
+    assert (few.measured, few.escaped) == (measured, escaped)
+    assert (few.figures.readings, few.figures.rejects) == (whole.readings, whole.rejects)
+
+
+def test_wear_that_nobody_measures_is_not_corrected() -> None:
+    """1 µm a part, corrected in full from 6 µm on: of every part none is out (8 µm), of 1 in 20 those before the next are."""
+    trace = without_events(np.arange(200) / 1000)
+    policy = Policy((ReplayedCharacteristic(SEAT, 1.0),))
+    first, fewer = sampled(trace, policy, [Plan(every=1), Plan(every=20, after_alarm=1)])
+    assert (first.measured, first.escaped, first.figures.rejects, first.figures.alarms) == (200, 0, 0, 0)
+    assert fewer.measured < 30
+    assert fewer.figures.alarms < fewer.figures.rejects == fewer.escaped + fewer.figures.alarms
+    assert fewer.figures.corrections < first.figures.corrections
 
 
 def test_agreement_of_nothing_is_not_a_number() -> None:

@@ -271,6 +271,7 @@ BODIES: dict[str, dict[str, Any]] = {
     "PUT /api/v1/gauge-studies/{study}": GAUGE | WHY | {"seen_revision": 1},
     "POST /api/v1/signals/{signal}/comment": {"cause": "material", "comment": "New batch, harder by 20 HB"},
     "POST /api/v1/characteristics/{characteristic}/what-if": WHAT_IF | {"weighting_factor": 3.0, "zero_range": 0.002},
+    "POST /api/v1/characteristics/{characteristic}/what-if/sampling": WHAT_IF,
     "POST /api/v1/characteristics/{characteristic}/what-if/map": WHAT_IF
     | {"weighting_factors": [1.0, 2.0], "zero_ranges": [0.001, 0.002], "criterion": "ppk"},
     "POST /api/v1/characteristics/{characteristic}/proposals": WHAT_IF | {"zero_range": 0.0015} | WHY,

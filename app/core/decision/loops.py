@@ -224,6 +224,8 @@ TALLY = np.dtype(
                 "held",
                 "inner",  # raw deviation within R37: what the sums are of
                 "of_tool",  # corrections of every lane
+                "measured",  # of the readings: all but those that a sampling leaves out
+                "escaped",  # of the rejects: those that were not measured
             )
         ],
         *[(name, np.float64) for name in ("sum", "squares", "largest", "sizes")],  # mm; sizes: of the errors removed
@@ -232,21 +234,54 @@ TALLY = np.dtype(
 """Sums over the readings of the lanes that count and are not left out."""
 
 
+EVERY_PART = np.array([1, 0, 0], np.int64)
+"""A sampling: 1 in N parts is measured, and every part for N readings after a fresh edge, and after an alarm."""
+
+
+def _is_out(rules: Any, deviation: float, made: Any) -> bool:
+    return not within(nanometres(judged_size(rules, deviation, made.decided)), rules.tolerance)
+
+
+def _alarms(rules: Any, deviation: float, made: Any, mark: int) -> bool:
+    """Tell if a reading raises an alarm: by its size, or as it did then."""
+    if made.zone in (FAULT, WEAR) or made.code == OFFSET_LIMIT:
+        return True
+    return mark & Mark.REJECTED != 0 or mark & Mark.JUMP != 0 or _is_out(rules, deviation, made)
+
+
+def _after(sampling: Whole, tight: int, raised: bool, fault: bool) -> tuple[int, int]:
+    """Return the parts to leave out after one that was measured, and the readings for which every part is measured yet."""
+    tight = max(tight - 1, sampling[2] if raised else 0)
+    return (0 if tight > 0 or fault else sampling[0] - 1), tight
+
+
+def _count_size(tally: Any, rules: Any, deviation: float) -> bool:
+    """Add a part to the tally, measured or not; whether it is a reject."""
+    size = nanometres(deviation)
+    reject = not within(size, rules.tolerance) and not reaches(size, rules.confidence)
+    tally.readings += 1
+    tally.rejects += reject
+    if not reaches(size, rules.wear):
+        tally.inner += 1
+        tally.sum += deviation
+        tally.squares += deviation * deviation
+        tally.largest = max(tally.largest, abs(deviation))
+    return reject
+
+
 def _count(tally: Any, rules: Any, deviation: float, made: Any) -> None:
     """Add a reading to the tally."""
-    size = nanometres(deviation)
-    tally.readings += 1
+    _count_size(tally, rules, deviation)
+    tally.measured += 1
     if made.zone == FAULT:
         tally.faults += 1
     elif made.zone == WEAR:
         tally.worn += 1
-    elif not within(nanometres(judged_size(rules, deviation, made.decided)), rules.tolerance):
+    elif _is_out(rules, deviation, made):
         if judged_size(rules, deviation, made.decided) > 0:
             tally.oversize += 1
         else:
             tally.undersize += 1
-    if not within(size, rules.tolerance) and not reaches(size, rules.confidence):
-        tally.rejects += 1
     if made.code == OFFSET_LIMIT:
         tally.offset_limit += 1
     if made.action == HOLD:
@@ -254,19 +289,14 @@ def _count(tally: Any, rules: Any, deviation: float, made: Any) -> None:
     elif made.action == CORRECT:
         tally.corrections += 1
         tally.sizes += abs(made.size_error)
-    if not reaches(size, rules.wear):
-        tally.inner += 1
-        tally.sum += deviation
-        tally.squares += deviation * deviation
-        tally.largest = max(tally.largest, abs(deviation))
 
 
 @compiled
-def follow(trace: ProcessTrace, lanes: Rows, delay: int, result: ReplayResult, tally: Any) -> None:
-    """Follow the loop along the trace with one policy, recorded in `result` and summed up in `tally`.
+def follow(trace: ProcessTrace, lanes: Rows, delay: int, sampling: Whole, result: ReplayResult, tally: Any) -> None:
+    """Follow the loop along the trace with one policy, recorded in `result` and summed up in `tally`, a row of `TALLY`.
 
-    lanes: of `LANE`. delay: parts that come out with the old offset after a correction has been issued. tally: a row of
-    `TALLY`.
+    lanes: of `LANE`. delay: parts that come out with the old offset after a correction has been issued. sampling: as `EVERY_PART`,
+    of the lanes that count; a part that is not measured has a size and no decision, and is not recorded.
     """
     free, lane_of, marks, parts, start_offset, start_pending, start_average = trace
     deviations, decisions, averages_after, amounts, offsets, zones, codes = result
@@ -274,10 +304,10 @@ def follow(trace: ProcessTrace, lanes: Rows, delay: int, result: ReplayResult, t
     averages = np.zeros(start_average.shape[1])
     room = (delay + 2) * len(lanes) + 4
     due_amount, due_part = np.zeros(room), np.zeros(room, np.int64)
-    head, waiting = 0, 0
-    begun = 0
+    head, waiting, begun = 0, 0, 0
     offset, pending, total, held = 0.0, 0.0, 0.0, 0.0
     holding = False
+    skip, tight = 0, 0  # parts to leave out yet; readings for which every part is measured yet
     for i in range(len(free)):
         mark, part = marks[i], parts[i]
         lane = lanes[lane_of[i]]
@@ -291,6 +321,8 @@ def follow(trace: ProcessTrace, lanes: Rows, delay: int, result: ReplayResult, t
             head, waiting, holding = 0, 0, False
             if pending != 0.0:
                 due_amount[0], due_part[0], waiting = pending, part + delay + 1, 1
+            if sampling[1] > 0:
+                skip, tight = 0, max(tight, sampling[1])
         if mark & Mark.RESTART and memory >= 0:
             averages[memory] = 0.0
         if mark & Mark.RELEASED and holding:
@@ -301,6 +333,11 @@ def follow(trace: ProcessTrace, lanes: Rows, delay: int, result: ReplayResult, t
             head = head + 1 if head + 1 < room else 0
             waiting -= 1
         deviation = rounded(free[i] + lane.response * offset)
+        if lane.counts and skip > 0:
+            skip -= 1
+            if not mark & Mark.LEFT_OUT and _count_size(tally, lane, deviation):
+                tally.escaped += 1
+            continue
         made = step(
             lane,
             float(averages[memory]) if memory >= 0 else 0.0,  # uncompiled, NumPy's own floats round otherwise
@@ -328,6 +365,8 @@ def follow(trace: ProcessTrace, lanes: Rows, delay: int, result: ReplayResult, t
         if recorded:
             deviations[i], decisions[i], averages_after[i] = deviation, made.decided, made.average
             amounts[i], offsets[i], zones[i], codes[i] = made.amount + 0.0, offset, made.zone, made.code
+        if lane.counts and sampling[0] > 1:
+            skip, tight = _after(sampling, tight, _alarms(lane, deviation, made, mark), made.zone == FAULT)
         if mark & Mark.LEFT_OUT:
             continue
         tally.of_tool += made.action == CORRECT
@@ -336,7 +375,9 @@ def follow(trace: ProcessTrace, lanes: Rows, delay: int, result: ReplayResult, t
 
 
 @compiled
-def follow_each(trace: ProcessTrace, lanes: Rows, delay: int, nothing: ReplayResult, tallies: Rows) -> None:
-    """The same with many policies, summed up alone: a row of lanes and a tally each. nothing: `ReplayResult.room(0)`."""
+def follow_each(
+    trace: ProcessTrace, lanes: Rows, delay: int, samplings: Whole, nothing: ReplayResult, tallies: Rows
+) -> None:
+    """The same with many policies, summed up alone: a row of lanes, a sampling and a tally each. nothing: `ReplayResult.room(0)`."""
     for policy in range(len(lanes)):
-        follow(trace, lanes[policy], delay, nothing, tallies[policy])
+        follow(trace, lanes[policy], delay, samplings[policy], nothing, tallies[policy])

@@ -18,6 +18,8 @@ from app.quality.what_if.schemas import (
     ProposalDecisionIn,
     ProposalIn,
     ProposalOut,
+    SampledIn,
+    SampledOut,
     WhatIfIn,
     WhatIfOut,
 )
@@ -46,6 +48,19 @@ def replay_readings(session: SessionDep, characteristic: CharacteristicKey, aske
     """
     current = characteristics.characteristic_named(session, characteristic)
     return WhatIfOut.of(simulation.replayed(session, current, asked))
+
+
+@router.post(
+    "/characteristics/{characteristic}/what-if/sampling", responses=problems(404, 429), dependencies=[require("viewer")]
+)
+def sample_readings(session: SessionDep, characteristic: CharacteristicKey, asked: SampledIn) -> SampledOut:
+    """Replay stored readings as if 1 in N parts had been measured; nothing is changed.
+
+    A part that is not measured is cut with the offset of the moment, raises no alarm and asks for no correction. Each stored reading is
+    taken for a part: what was not measured then is not known now.
+    """
+    current = characteristics.characteristic_named(session, characteristic)
+    return SampledOut.of(simulation.sampled(session, current, asked))
 
 
 @router.post(

@@ -8,7 +8,7 @@ from app.core.spc.quoting import Quoting
 from app.core.spc.refusal import Refused
 from app.loop.summaries.wording import refusal
 from app.quality.what_if import wording
-from app.quality.what_if.queries import Cell, Likeness, Map, Simulation
+from app.quality.what_if.queries import Cell, Likeness, Map, Sampling, Simulation
 from app.quality.what_if.tool_history import ToolHistory
 
 SETTINGS = ("weighting_factor", "zero_range", "averaging_limit", "factor")
@@ -55,6 +55,18 @@ def figures_of(figures: Figures) -> dict[str, Any]:
 def quote_of(quoting: Quoting) -> dict[str, Any]:
     """The index that may be quoted of them."""
     return {"quote": quoting.quote.value, "quoted": quoting.value, "why_none": quoting.why}
+
+
+def sampling_of(sampling: Sampling) -> dict[str, Any]:
+    """The same readings with fewer parts measured."""
+    return period_of(sampling.past) | {
+        "delay": sampling.delay,
+        "settings": {name: getattr(sampling.parameters, name) for name in SETTINGS},
+        "after_change": sampling.plan.after_change,
+        "after_alarm": sampling.plan.after_alarm,
+        "rows": [row._asdict() | {"figures": figures_of(row.figures)} for row in sampling.rows],
+        "cautions": wording.cautions(sampling.past) + wording.sampled(sampling),
+    }
 
 
 def likeness_of(likeness: Likeness) -> dict[str, Any]:

@@ -23,8 +23,8 @@ from app.quality.proof import wording as proof_wording
 from app.quality.what_if import actions, form_reader, map_axes, proposals, simulation, wording
 from app.quality.what_if.evidence import effect_of, period_of, quote_of
 from app.quality.what_if.map_view import view_of
-from app.quality.what_if.queries import Map, Simulation
-from app.quality.what_if.schemas import ProposalDecisionIn, ProposalIn
+from app.quality.what_if.queries import Map, Sampling, Simulation
+from app.quality.what_if.schemas import ProposalDecisionIn, ProposalIn, SampledIn
 from app.web.deps import Before, FormDep, SessionDep, Sought, Word
 from app.web.fields import LARGEST_ID
 from app.web.forms import by_field, parsed
@@ -34,6 +34,8 @@ from app.web.templates import page
 
 router = APIRouter(include_in_schema=False)
 ON_PAGE = 50
+FEWER = [1, 2, 3, 5, 10, 20, 50]
+"""Parts of which one is measured, on the page."""
 Number = Annotated[int, Path(ge=1, le=LARGEST_ID)]
 VERBS = {
     "approve": (actions.approve, "approved"),
@@ -62,11 +64,13 @@ def _what_if(
     refused: InbandError | None = None,
 ) -> Response:
     answer: Simulation | None = None
+    fewer: Sampling | None = None
     map_result: Map | Invalid | None = None
     status, problem, errors = 200, refused, form_reader.at_fields(by_field(refused)) if refused else {}
     try:
         request_body = form_reader.request_of(typed)
-        answer, map_result = simulation.both(session, current, request_body, form_reader.map_request(typed))
+        asked = SampledIn(**request_body.model_dump(by_alias=True), every=FEWER)
+        answer, fewer, map_result = simulation.everything(session, current, asked, form_reader.map_request(typed))
     except (Invalid, TooManyRequests) as error:
         # That a period holds nothing to replay is no mistake of who looks at it.
         status = error.status if error.errors or isinstance(error, TooManyRequests) else 200
@@ -97,6 +101,7 @@ def _what_if(
         period=period_of(answer.past) if answer else None,
         effects=form_reader.effects(typed["effect"]),
         cautions=wording.cautions(answer.past) if answer else [],
+        fewer=fewer,
         map=view_of(map_result, answer, typed, key) if answer and isinstance(map_result, Map) else None,
         no_map=map_result if isinstance(map_result, Invalid) else None,
         criteria=[(criterion_.value, wording.criterion(criterion_)) for criterion_ in Criterion],

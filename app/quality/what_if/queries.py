@@ -1,7 +1,7 @@
 """Current and selected settings side by side, the map, and the accuracy of the simulation. Never writes."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from math import isfinite, sqrt
 
@@ -9,13 +9,14 @@ import numpy as np
 from sqlalchemy import all_, func, select
 from sqlalchemy.orm import Session
 
+from app.core.control_plan import Plan
 from app.core.decision.limits import FAULT, WEAR, in_nanometres, nanometres, reaches, within
 from app.core.decision.loops import ReplayResult, Whole
 from app.core.decision.step import OFFSET_LIMIT
 from app.core.effect import Effect, measured_effect
 from app.core.parameters import Feature, ParameterError, Parameters, read
 from app.core.policy_map import Criterion, Region, best_region, in_order, with_settings
-from app.core.replay import FEWEST_FOR_PPK, Figures, agreement, figures_of, run
+from app.core.replay import FEWEST_FOR_PPK, Figures, Sampled, agreement, figures_of, run, sampled
 from app.core.spc import USUAL_READINGS
 from app.core.spc.capability import Limits
 from app.core.spc.quoting import Quote, Quoting, quoting_of
@@ -34,6 +35,7 @@ from app.quality.what_if.turn_limit import on_all_cores, turn
 __all__ = [
     "USUAL",
     "Map",
+    "Sampling",
     "Settings",
     "Simulation",
     "ToolHistory",
@@ -43,6 +45,7 @@ __all__ = [
     "on_all_cores",
     "past_of",
     "proposals",
+    "sampling_of",
     "side_by_side",
     "turn",
 ]
@@ -158,6 +161,22 @@ class Map:
     region: Region
 
 
+@dataclass(frozen=True)
+class Sampling:
+    """The same readings with 1 in N parts measured, a row each N. plan: the rules by which every part is measured for a while."""
+
+    past: ToolHistory
+    delay: int
+    parameters: Parameters
+    plan: Plan
+    rows: list[Sampled]
+
+    @property
+    def has_gaps(self) -> bool:
+        """Tell if the plan in force leaves parts out by itself, which are not among these readings."""
+        return (self.plan.every or 1) > 1
+
+
 def load(session: Session, current: CurrentCharacteristic, window: Window) -> ToolHistory:
     """The past, and a refusal in words where there is nothing that could be replayed. Raises `Invalid`."""
     past = past_of(session, current, window)
@@ -198,6 +217,17 @@ def side_by_side(session: Session, past: ToolHistory, settings: Settings) -> Sim
         other_result=other_result,
         parameters=other,
     )
+
+
+def sampling_of(past: ToolHistory, settings: Settings, plan: Plan, intervals: Sequence[int]) -> Sampling:
+    """Replay these settings with 1 in N parts measured, tightened as the plan says."""
+    parameters = settings.applied_to(past.current.parameters)
+    check_order(parameters, settings)
+    delay, trace = _delay(past, settings), past.with_effect(settings.effect)
+    policy = past.policy(parameters, delay, settings.effect)
+    plans = [replace(plan, every=every) for every in intervals]
+    rows = [row._replace(figures=past.carried(row.figures)) for row in sampled(trace, policy, plans)]
+    return Sampling(past, delay, parameters, plan, rows)
 
 
 def map_of(

@@ -8,10 +8,11 @@ from pydantic import BaseModel, Field
 from app.core.period import Period
 from app.core.policy_map import Criterion
 from app.core.replay import LONGEST_DELAY
+from app.core.sampling import CHOICES
 from app.files.formats import periods
-from app.quality.what_if.evidence import cell_of, evidence_of, period_of
+from app.quality.what_if.evidence import cell_of, evidence_of, period_of, sampling_of
 from app.quality.what_if.proposals import ProposalRow
-from app.quality.what_if.queries import USUAL, Map, Simulation
+from app.quality.what_if.queries import USUAL, Map, Sampling, Simulation
 from app.web.choice import BEGINNING, ENDING, Beginning, Ending
 from app.web.fields import LARGEST_ID, Body, Reason, answer_from
 
@@ -75,6 +76,28 @@ class WhatIfIn(SettingsIn):
 
     weighting_factor: Annotated[float | None, Field(ge=1, le=1_000_000, strict=True, description="k (R29).")] = None
     zero_range: Annotated[Length | None, Field(description="R33.")] = None
+
+
+Every = Annotated[int, Field(strict=True, ge=1, le=1000)]
+Few = Annotated[int, Field(strict=True, ge=0, le=1000)]
+
+
+class SampledIn(WhatIfIn):
+    """Readings to replay with 1 in N parts measured, and the selected settings."""
+
+    every: Annotated[
+        list[Every],
+        Field(
+            default_factory=lambda: list(CHOICES), min_length=1, max_length=50, description="Values of N, a row each."
+        ),
+    ]
+    after_change: Annotated[
+        Few | None,
+        Field(description="Every part is measured for N readings after a tool change; null: as the control plan says."),
+    ] = None
+    after_alarm: Annotated[
+        Few | None, Field(description="The same after an alarm by a reading; null: as the control plan says.")
+    ] = None
 
 
 class MapIn(SettingsIn):
@@ -193,6 +216,37 @@ class WhatIfOut(PeriodOut):
     def of(cls, answer: Simulation) -> "WhatIfOut":
         """As it is answered."""
         return cls.model_validate(evidence_of(answer))
+
+
+class SampledRowOut(BaseModel):
+    """The same parts with 1 in `every` of them measured."""
+
+    every: Annotated[int, Field(description="1 in N parts is measured.")]
+    measured: Annotated[int, Field(description="Parts that are measured.")]
+    escaped: Annotated[int, Field(description="Parts out of tolerance that are not measured.")]
+    figures: Annotated[
+        FiguresOut,
+        Field(
+            description="Readings, rejects, mean, spread, Ppk and largest are of all parts, measured or not; corrections and alarms of "
+            "those that are measured."
+        ),
+    ]
+
+
+class SampledOut(PeriodOut):
+    """The same readings with fewer parts measured, a row each N."""
+
+    delay: int = Field(description="Parts between a correction and its effect in the replay.")
+    settings: dict[str, float] = Field(description="k, R33, R34 and factor by name.")
+    after_change: Annotated[int, Field(description="Every part is measured for N readings after a tool change.")]
+    after_alarm: Annotated[int, Field(description="The same after an alarm by a reading.")]
+    rows: Annotated[list[SampledRowOut], Field(description="In the order in which they were asked for.")]
+    cautions: Annotated[list[str], Field(description="Limits of these numbers.")]
+
+    @classmethod
+    def of(cls, sampling: Sampling) -> "SampledOut":
+        """As it is answered."""
+        return cls.model_validate(sampling_of(sampling))
 
 
 class CellOut(BaseModel):

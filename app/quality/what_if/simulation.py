@@ -1,5 +1,7 @@
 """From what somebody asks to what is replayed, one at a turn."""
 
+from dataclasses import replace
+
 from sqlalchemy.orm import Session
 
 from app.core.policy_map import with_settings
@@ -7,10 +9,11 @@ from app.core.spc.refusal import Refused
 from app.errors import FieldError, Invalid
 from app.language.i18n import _
 from app.loop.characteristics.queries import CurrentCharacteristic
+from app.loop.control_plan import queries as plans
 from app.loop.summaries import queries as statistics
 from app.quality.what_if import map_axes, queries
-from app.quality.what_if.queries import Map, Settings, Simulation
-from app.quality.what_if.schemas import MapIn, ReplayPeriodIn, SettingsIn, WhatIfIn
+from app.quality.what_if.queries import Map, Sampling, Settings, Simulation
+from app.quality.what_if.schemas import MapIn, ReplayPeriodIn, SampledIn, SettingsIn, WhatIfIn
 from app.quality.what_if.tool_history import ToolHistory
 from app.quality.what_if.turn_limit import turn
 
@@ -28,6 +31,21 @@ def mapped(session: Session, current: CurrentCharacteristic, given: MapIn) -> Ma
     """The map. Raises `Invalid`, `TooManyRequests`."""
     with turn():
         return map_of(_past(session, current, given), given)
+
+
+def sampled(session: Session, current: CurrentCharacteristic, given: SampledIn) -> Sampling:
+    """With 1 in N parts measured. Raises `Invalid`, `TooManyRequests`."""
+    with turn():
+        return sampling_of(session, _past(session, current, given), given)
+
+
+def sampling_of(session: Session, past: ToolHistory, given: SampledIn) -> Sampling:
+    """The same of a past that is loaded already; what is not given of the tightening is as the plan in force has it."""
+    plan = plans.stated(plans.plan_of(session, past.current))
+    change = plan.after_change if given.after_change is None else given.after_change
+    alarm = plan.after_alarm if given.after_alarm is None else given.after_alarm
+    tightened = replace(plan, after_change=change, after_alarm=alarm)
+    return queries.sampling_of(past, settings(past, given), tightened, given.every)
 
 
 def map_of(past: ToolHistory, given: MapIn) -> Map:
@@ -48,18 +66,18 @@ def map_of(past: ToolHistory, given: MapIn) -> Map:
     )
 
 
-def both(
-    session: Session, current: CurrentCharacteristic, given: WhatIfIn, around: MapIn
-) -> tuple[Simulation, Map | Invalid]:
-    """Side by side, and the map of the same period, or why there is none."""
+def everything(
+    session: Session, current: CurrentCharacteristic, given: SampledIn, around: MapIn
+) -> tuple[Simulation, Sampling, Map | Invalid]:
+    """Side by side, with fewer parts measured, and the map of the same period, or why there is none."""
     with turn():
         past = _past(session, current, given)
         answer = queries.side_by_side(session, past, settings(past, given))
-        _said = answer.effect
+        _said, fewer = answer.effect, sampling_of(session, past, given)
         try:
-            return answer, map_of(past, around)
+            return answer, fewer, map_of(past, around)
         except Invalid as refused:
-            return answer, refused
+            return answer, fewer, refused
 
 
 def settings(past: ToolHistory, given: SettingsIn) -> Settings:

@@ -19,7 +19,7 @@ from app.quality.capability.wording import named
 if TYPE_CHECKING:
     from app.core.effect import Effect
     from app.quality.what_if.proposals import ProposalRow
-    from app.quality.what_if.queries import Likeness
+    from app.quality.what_if.queries import Likeness, Sampling
     from app.quality.what_if.tool_history import ToolHistory
 
 
@@ -160,6 +160,32 @@ def cautions(past: ToolHistory) -> list[str]:
             ).format(version=past.baseline)
         )
     return cautions
+
+
+def sampled(sampling: Sampling) -> list[str]:
+    """Limits of a replay with fewer parts measured."""
+    change, alarm = sampling.plan.after_change, sampling.plan.after_alarm
+    tightened = ngettext(
+        "Every part is measured for {n} reading after an alarm,",
+        "Every part is measured for {n} readings after an alarm,",
+        alarm,
+    ).format(n=alarm)
+    tightened += " " + _("and for {n} after a tool change or an offset set by hand.").format(n=change)
+    if not change and not alarm:
+        tightened = _("After an alarm and a tool change no more parts are measured: the control plan does not say so.")
+    sentences = [
+        _("Each stored reading is taken for a part; a part that was not measured then is not known."),
+        tightened,
+        _("Sudden events fall where they fell: of few of them in the period, these counts show little."),
+    ]
+    if sampling.has_gaps:
+        sentences.insert(
+            1,
+            _("The control plan measures 1 in {n} parts already: the parts in between are missing here.").format(
+                n=sampling.plan.every
+            ),
+        )
+    return sentences
 
 
 def left_out(past: ToolHistory) -> list[str]:

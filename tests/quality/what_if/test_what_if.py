@@ -100,6 +100,22 @@ def test_a_map_of_another_averaging_limit(ran: Shop) -> None:
     assert len(made["cells"]) >= 300
 
 
+def test_fewer_parts_measured_on_the_stored_history(ran: Shop, server: Server) -> None:
+    found = ask(ran, what="/sampling", every=[1, 4], after_alarm=2)
+    first, fewer = found["rows"]
+    today = ask(ran)["today"]
+    assert (first["measured"], first["escaped"]) == (PARTS, 0)
+    assert alike(first["figures"], today)
+    assert PARTS / 4 <= fewer["measured"] < PARTS / 2
+    assert fewer["figures"]["readings"] == PARTS
+    assert fewer["figures"]["corrections"] < today["corrections"] / 2
+    assert (found["after_change"], found["after_alarm"]) == (0, 2), "what is not given is as the plan says"
+    assert "stored reading is taken for a part" in " ".join(found["cautions"])
+    page = Person(server, "viewer").open(f"/characteristics/{ran.characteristic}/what-if?k=3")
+    assert "With fewer parts measured" in page
+    assert "the control plan does not say so" in page
+
+
 def test_what_was_held_and_what_was_excluded_removed_nothing(shop: Shop) -> None:
     shop.call(
         "PATCH",
