@@ -269,6 +269,7 @@ async def heartbeat(unit: Unit) -> dict[str, Any]:
         "mapping": machine.mapping_hash(),
         "hold_all": unit.held,
         "carries_decisions": carries_decisions(unit.link),
+        "running": unit.context.running() if unit.context else None,
         "held_back": [
             {"tool_memory": each.tool_memory, "number": each.number, "reason": line(each.reason, MOST_REASON)}
             for each in unit.held_back[:MOST_HELD_BACK]

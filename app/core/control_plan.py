@@ -3,7 +3,7 @@
 A part counts as cut once another characteristic of it was measured, or once a later number shows it (`Plan.numbered`). The part
 that is being worked on is never missed: it counts when a later one was begun. Where nothing tells of parts their number is None:
 not known is not missed. Minutes count while the machine runs: between two readings of the same part's characteristics that are at
-most `PAUSE` apart. Times are seconds of one clock.
+most `PAUSE` apart, or while the control itself reports that it runs, whichever is more. Times are seconds of one clock.
 
 A tool change or an alarm asks for every part from its moment on: parts that were cut before it are judged by the plan alone.
 """
@@ -83,6 +83,13 @@ class Moment(NamedTuple):
     source: int
     part: str | None = None
     shift: float = 0.0
+
+
+class Run(NamedTuple):
+    """A time in which the control reported that it ran."""
+
+    begin: float
+    until: float
 
 
 class Ran(NamedTuple):
@@ -177,6 +184,7 @@ def ran(
     *,
     now: Moment,
     measured: frozenset[str] = frozenset(),
+    runs: Iterable[Run] = (),
     closed: bool = False,
     event: float = -inf,
 ) -> Ran:
@@ -184,7 +192,7 @@ def ran(
 
     others: readings of other characteristics of the same part between them, in any order. closed: `now` is the reading that
     ended it; else it is this moment, and readings of a clock that is ahead of it count too. measured: names of parts that
-    were measured, whenever. event: from it on every part was to be measured.
+    were measured, whenever. runs: times in which the control reported that it ran. event: from it on every part was to be measured.
 
     >>> others = [Moment(60.0, 2, "P8"), Moment(120.0, 2, "P9"), Moment(180.0, 2, "P10")]
     >>> ran(Plan(every=1), Moment(0.0, 1, "P7"), others, now=Moment(200.0, 1))
@@ -193,6 +201,7 @@ def ran(
     until = now.at if closed else inf
     signs = sorted((each for each in others if last.at < each.at <= until), key=lambda each: each.at)
     steps = (after.at - before.at for before, after in pairwise([last, *signs]))
+    reported = (min(run.until, now.at) - max(run.begin, last.at) for run in runs)
     ended = now.part if closed else None
     parts = parts_after = _parts(plan, last, signs, ended, measured)
     if event > last.at:
@@ -202,7 +211,7 @@ def ran(
         parts_after = _parts(plan, base, [each for each in signs if each.at > event], ended, begun_before)
     return Ran(
         parts,
-        sum(step for step in steps if step <= PAUSE) / 60,
+        max(sum(step for step in steps if step <= PAUSE), sum(each for each in reported if each > 0)) / 60,
         len({each.shift for each in signs if last.shift < each.shift < now.shift}),
         parts_after,
     )

@@ -83,6 +83,7 @@ ADDED_TABLES = {
     "quarantined_part",
     "control_plan",
     "missed_measurement",
+    "machine_run",
     "reaction_plan",
     "catalogue_entry",
     "thermal_expansion",

@@ -40,6 +40,7 @@ PASSING = {
     "kinematics_plan",
     "known_place",
     "login_failure",
+    "machine_run",
     "notification_route",
     "outlook",
     "receiver",

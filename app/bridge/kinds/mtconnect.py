@@ -172,6 +172,7 @@ class Context:
         self._next = 0
         self._until: datetime | None = None
         self._trusted = timedelta(seconds=2 * settings.every + 1)  # an answer holds until the next but one is due
+        self._executions: dict[str, str | None] = {}  # of each path of the control
         self._parts: list[tuple[datetime, int, str | None]] = []
         self._noted = 0
 
@@ -211,6 +212,12 @@ class Context:
             return None
         index = bisect.bisect_right(self._parts, moment, key=lambda entry: entry[0])
         return self._parts[index - 1][2] if index else None
+
+    def running(self) -> bool | None:
+        """Tell if the control runs a program now: one of its paths does. None if the agent does not say, or has been unreachable."""
+        recent = self._until is not None and datetime.now(UTC) <= self._until + self._trusted
+        told = [value for value in self._executions.values() if value is not None]
+        return "ACTIVE" in told if told and recent else None
 
     def summary(self) -> str:
         """One sentence for the heartbeat."""
@@ -270,6 +277,7 @@ class Context:
             self._ranks.clear()
         self._ranks = self._told(answer.observations) | self._ranks
         self.values.clear()
+        self._executions.clear()
         self._take(answer, asked)
         same = not again and before is not None and before == self.values.get("part")
         if until is not None and not (same and max(self._parts, key=lambda entry: entry[1])[0] <= until):
@@ -313,6 +321,8 @@ class Context:
         if abs(ahead) < WHOLE_SECONDS:
             ahead = timedelta()
         for each in answer.observations:
+            if each.element == "Execution":
+                self._executions[each.item] = each.value
             if (known := self._items.get(each.item)) is None:
                 continue
             name, rank = known

@@ -6,7 +6,7 @@ A heartbeat takes no lock of the machine and waits for no disk: what a crash los
 from datetime import datetime, timedelta
 from typing import Any, NamedTuple
 
-from sqlalchemy import case, delete, func, select, text
+from sqlalchemy import case, delete, func, select, text, update
 from sqlalchemy.dialects.postgresql import insert
 from sqlalchemy.orm import Session
 
@@ -21,9 +21,12 @@ from app.loop.connections.schemas import HeartbeatIn
 from app.loop.connections.touch_tests.actions import abandon
 from app.loop.connections.touch_tests.queries import TouchTestRow, open_test
 from app.loop.machines.queries import lock_machines, machine_for, machine_named
-from app.loop.tables.connections import Connection
+from app.loop.tables.connections import Connection, MachineRun
 
 GOOD = ("starting", "online")
+SAME_RUN = timedelta(minutes=1)
+"""Between two heartbeats that say that the control runs: one may be lost, and a part is changed."""
+KEPT = timedelta(days=30)
 _NO_DISK = text("SELECT set_config('synchronous_commit', 'off', true), now()")
 
 
@@ -67,6 +70,8 @@ def take_heartbeat(
         ),
     }
     session.execute(row.on_conflict_do_update(index_elements=["machine_id"], set_=changed))
+    if beat.running:
+        _note_run(session, owner.id, now)
     if (
         known is None
         or (known.state, known.hold_all, known.quarantined) != (beat.state, beat.hold_all, beat.quarantined)
@@ -75,6 +80,15 @@ def take_heartbeat(
     ):
         publish(session, {"kind": "connection", "machine": owner.key, "state": beat.state})
     return Beat(now, queries.server_mark(session), open_test(session, owner))
+
+
+def _note_run(session: Session, machine_id: int, now: datetime) -> None:
+    """Note that the control runs: the run goes on, or after a pause another begins. What is old goes."""
+    of = MachineRun.machine_id == machine_id
+    goes_on = update(MachineRun).where(of, MachineRun.until > now - SAME_RUN).values(until=now)
+    if not session.execute(goes_on.returning(MachineRun.begin)).first():
+        session.execute(delete(MachineRun).where(of, MachineRun.until < now - KEPT))
+        session.execute(insert(MachineRun).values(machine_id=machine_id, begin=now, until=now).on_conflict_do_nothing())
 
 
 def remove_connection(session: Session, machine: str, caller: Caller) -> None:

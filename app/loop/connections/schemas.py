@@ -129,6 +129,14 @@ class HeartbeatIn(Body):
             description="true: `stop` and `hold` reach the control; false: this machine cannot be stopped by Inband; null: the bridge does not say.",
         ),
     ] = None
+    running: Annotated[
+        bool | None,
+        Field(
+            strict=True,
+            description="true: the control says that it cuts (a program runs in automatic). Its minutes count for control plans by "
+            "minutes. false: it does not run; null: the bridge does not know.",
+        ),
+    ] = None
 
 
 class ServerOut(BaseModel):

@@ -1,4 +1,4 @@
-"""Periodic job: looks at the control plans whose part was measured lately, one characteristic at a time."""
+"""Periodic job: looks at the control plans whose part was measured lately, or whose machine ran, one characteristic at a time."""
 
 from sqlalchemy import text
 from sqlalchemy.orm import Session
@@ -6,8 +6,8 @@ from sqlalchemy.orm import Session
 from app.jobs.actions import PeriodicJob, Unit
 from app.loop.control_plan.actions import keep
 
-# Nothing can have been missed where neither this characteristic nor another one of its part had a reading since. After half a day
-# without any, the last look knew all. In no order: not all may be
+# Nothing can have been missed where neither this characteristic nor another one of its part had a reading since, nor the control
+# reported that it runs. After half a day without any, the last look knew all. In no order: not all may be
 # looked at in a minute, and none is to be always the last.
 _DUE = text("""
 SELECT p.machine_id, p.characteristic_id, c.key
@@ -19,6 +19,9 @@ AND (s.sequence > p.seen OR EXISTS (
     SELECT FROM stream o JOIN characteristic b ON b.machine_id = o.machine_id AND b.id = o.characteristic_id
     WHERE o.machine_id = p.machine_id AND b.id <> c.id AND (b.part = c.part OR p.numbered AND b.part IS NULL AND c.part IS NULL)
     AND o.last_received_at > greatest(coalesce(s.last_received_at, p.since), p.since, now() - interval '12 hours')
+) OR p.minutes IS NOT NULL AND EXISTS (
+    SELECT FROM machine_run r WHERE r.machine_id = p.machine_id
+    AND r.until > greatest(coalesce(s.last_received_at, p.since), p.since, now() - interval '12 hours')
 ))
 ORDER BY random()
 """)

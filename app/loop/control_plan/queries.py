@@ -26,8 +26,8 @@ from app.core.period import ALWAYS, Period
 from app.db.period import in_period
 from app.loop.characteristics.queries import CurrentCharacteristic
 from app.loop.control_plan import signs
-from app.loop.tables.control_plan import ControlPlan, MissedMeasurement
 from app.loop.tables.characteristics import Characteristic
+from app.loop.tables.control_plan import ControlPlan, MissedMeasurement
 from app.loop.tables.machines import Machine
 from app.loop.tables.readings import Stream
 
@@ -120,6 +120,7 @@ def look(session: Session, row: ControlPlan, now: datetime | None = None) -> Loo
     moments = [(sequence, moment._replace(shift=signs.shift_of(moment.at))) for sequence, moment in moments]
     characteristic = session.get_one(Characteristic, (row.machine_id, row.characteristic_id))
     others = signs.other_readings(session, row, characteristic, moments[0][1].at)
+    runs = signs.runs(session, row, characteristic, moments[0][1].at)
     times = [each.at for each in others]
     measured = frozenset(each.moment.part for each in own if each.moment.part is not None)
     happened = signs.events(session, row, stream, own)
@@ -132,14 +133,15 @@ def look(session: Session, row: ControlPlan, now: datetime | None = None) -> Loo
     for (after, last), (until, this) in pairwise(moments):
         between = others[bisect_right(times, last.at) : bisect_right(times, this.at)]
         force = in_force(after)
-        passed = ran(plan, last, between, now=this, measured=measured, closed=True, event=force.at)
+        passed = ran(plan, last, between, now=this, measured=measured, runs=runs, closed=True, event=force.at)
         verdict = judged(plan, force, passed, in_this_shift=True, closed=True)
         if verdict.due is Due.MISSED:
             late.append(Interval(after, until, passed, verdict))
     sequence, last = moments[-1]
     here = Moment(now.timestamp(), 0, None, signs.shift_of(now.timestamp()))
     force = in_force(max(sequence, row.seen, *(each.sequence for each in own[-1:])))
-    since = ran(plan, last, others[bisect_right(times, last.at) :], now=here, measured=measured, event=force.at)
+    rest = others[bisect_right(times, last.at) :]
+    since = ran(plan, last, rest, now=here, measured=measured, runs=runs, event=force.at)
     verdict = judged(plan, force, since, in_this_shift=bool(sequence) and last.shift >= here.shift)
     seen = max(row.seen, stream.sequence, *(each.sequence for each in own[-1:]))
     return Look(

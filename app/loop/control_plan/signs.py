@@ -1,4 +1,5 @@
-"""Signs by which a control plan is judged: readings of its characteristic and of the others of the part, tool changes, alarms.
+"""Signs by which a control plan is judged: readings of its characteristic and of the others of the part, times in which the control
+reported that it ran, tool changes, alarms.
 
 Never writes.
 """
@@ -11,13 +12,14 @@ from typing import NamedTuple
 from sqlalchemy import and_, func, or_, select, true
 from sqlalchemy.orm import Session
 
-from app.core.control_plan import Moment, Tightened
+from app.core.control_plan import Moment, Run, Tightened
 from app.core.decision.step import Code
 from app.language.times import begin_of_shift
 from app.loop.control_plan.alarm_kinds import MISSED
-from app.loop.tables.control_plan import ControlPlan
 from app.loop.tables.alarms import Alarm
 from app.loop.tables.characteristics import Characteristic, ParametersVersion
+from app.loop.tables.connections import MachineRun
+from app.loop.tables.control_plan import ControlPlan
 from app.loop.tables.readings import Reading, Stream
 from app.loop.tables.tools import Tool
 
@@ -118,6 +120,33 @@ def _newest_of_others(
         if is_made and (own.part is not None or part is not None):
             found.append(Moment(at.timestamp(), source, part, shift_of(at.timestamp())))
     return found, more
+
+
+def runs(session: Session, row: ControlPlan, own: Characteristic, since: float) -> list[Run]:
+    """Times in which the control reported that it ran. None where another part was measured since: it may have run for that one."""
+    if row.minutes is None:
+        return []
+    moment = datetime.fromtimestamp(since, UTC)
+    another_part = (
+        select(Stream.characteristic_id)
+        .join(
+            Characteristic,
+            (Characteristic.machine_id == Stream.machine_id) & (Characteristic.id == Stream.characteristic_id),
+        )
+        .where(
+            Stream.machine_id == row.machine_id,
+            Characteristic.id != own.id,
+            or_(Characteristic.part.is_distinct_from(own.part), Characteristic.part.is_(None)),
+            Characteristic.form_of.is_distinct_from(own.id),
+            Stream.last_measured_at > moment,
+        )
+    )
+    if session.scalar(select(another_part.exists())):
+        return []
+    times = select(MachineRun.begin, MachineRun.until).where(
+        MachineRun.machine_id == row.machine_id, MachineRun.until > moment
+    )
+    return [Run(begin.timestamp(), until.timestamp()) for begin, until in session.execute(times)]
 
 
 def events(

@@ -1,4 +1,4 @@
-"""The last word of each bridge: one row per machine that ever had a heartbeat."""
+"""The last word of each bridge, one row per machine that ever had a heartbeat, and when its control ran."""
 
 from datetime import datetime
 from typing import Any
@@ -7,6 +7,16 @@ from sqlalchemy import ForeignKey
 from sqlalchemy.orm import Mapped, mapped_column
 
 from app.db.base import Base
+
+
+class MachineRun(Base):
+    """A time in which a control reported by its bridge that it ran; kept for some days. Times are of the server's clock."""
+
+    __tablename__ = "machine_run"
+
+    machine_id: Mapped[int] = mapped_column(ForeignKey("machine.id"), primary_key=True, autoincrement=False)
+    begin: Mapped[datetime] = mapped_column(primary_key=True)
+    until: Mapped[datetime]
 
 
 class Connection(Base):

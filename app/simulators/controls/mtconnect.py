@@ -23,6 +23,7 @@ ITEMS = {
     "target": ("PartCount", "PART_COUNT", "TARGET"),
     "program": ("Program", "PROGRAM", ""),
     "tool": ("ToolNumber", "TOOL_NUMBER", ""),
+    "execution": ("Execution", "EXECUTION", ""),
     "x": ("Position", "POSITION", "ACTUAL"),
 }
 """dataItemId: element, type, subType."""
@@ -103,6 +104,7 @@ class AgentSimulator:
         self.observe("count", str(model.parts))
         self.observe("target", "500")
         self.observe("program", "O1000")
+        self.observe("execution", "ACTIVE")
         if model.tool_in_spindle:
             self.observe("tool", str(model.tool_in_spindle))
         self.observe("x", f"{time.monotonic() % 200:.4f}")

@@ -111,6 +111,21 @@ def test_program_tool_and_part_are_known_as_soon_as_the_agent_tells_them() -> No
     run(work())
 
 
+def test_it_runs_while_the_agent_says_so() -> None:
+    async def work() -> None:
+        async with agent() as simulator, asking(simulator) as (context, http):
+            told = [context.running()]
+            for value in ("UNAVAILABLE", "READY", "ACTIVE", "FEED_HOLD", "ACTIVE"):
+                simulator.observe("execution", value)
+                await catch_up(context, http)
+                told.append(context.running())
+            assert told == [None, None, False, True, False, True]
+            context._until = datetime.now(UTC) - timedelta(minutes=5)
+            assert context.running() is None, "it has not answered since"
+
+    run(work())
+
+
 def test_unavailable_is_not_a_part() -> None:
     async def work() -> None:
         async with agent() as simulator, asking(simulator) as (context, http):

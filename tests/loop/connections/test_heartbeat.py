@@ -207,3 +207,28 @@ def test_a_machine_that_cannot_be_stopped_is_named_in_the_alarm(shop: Shop) -> N
     assert connection(shop)["carries_decisions"] is False
     beat(shop, carries_decisions=True)
     assert said not in text()
+
+
+def test_times_in_which_the_control_runs_are_kept(shop: Shop) -> None:
+    def runs(**back: float) -> list[bool]:
+        """Whether each run took a while; back: put them back by that first."""
+        of = "machine_id = (SELECT id FROM machine WHERE key = %s)"
+        with psycopg.connect(shop.server.database.dsn) as connection:
+            moved = f"UPDATE machine_run SET begin = begin - %s, until = until - %s WHERE {of}"  # noqa: S608 - our words
+            connection.execute(moved, (timedelta(**back), timedelta(**back), shop.machine))
+            query = f"SELECT until - begin >= interval '20 seconds' FROM machine_run WHERE {of} ORDER BY begin"  # noqa: S608
+            return [took for (took,) in connection.execute(query, (shop.machine,))]
+
+    beat(shop, running=False)
+    beat(shop)
+    beat(shop, running=None)
+    beat(shop, 422, running="yes")
+    assert runs() == []
+    beat(shop, running=True)
+    assert runs(seconds=20) == [False]
+    beat(shop, running=True)
+    assert runs(hours=1) == [True], "one heartbeat may be lost"
+    beat(shop, running=True)
+    assert runs(days=40) == [True, False]
+    beat(shop, running=True)
+    assert runs() == [False], "what is old goes"

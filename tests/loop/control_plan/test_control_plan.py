@@ -200,6 +200,30 @@ def test_by_minutes_and_by_shift_while_the_part_is_made(shop: Shop, other: str) 
     assert "shift" in look(shop)[0]["text"]
 
 
+def test_a_characteristic_alone_is_overdue_by_the_minutes_that_the_control_reports(shop: Shop) -> None:
+    plan(shop, minutes=20.0)
+    now = datetime.now(UTC)
+    ran = "INSERT INTO machine_run SELECT id, %s, %s FROM machine WHERE key = %s"
+    with psycopg.connect(shop.server.database.dsn) as connection:
+        connection.execute("UPDATE control_plan SET since = now() - interval '2 days'")
+        for begin, until in ((90, 45), (40, 35)):  # min ago; it ran before the reading too
+            times = [now - timedelta(minutes=each) for each in (begin, until)]
+            connection.execute(ran, (*times, shop.machine))
+    shop.read(0.1, measured_at=(now - timedelta(minutes=55)).isoformat())
+    assert (round(due(shop)["minutes"]), look(shop)) == (15, [])
+    for running in (False, None, True):
+        body: dict[str, Any] = {"version": "1", "state": "online", "waiting": 0, "running": running}
+        shop.call("POST", f"/machines/{shop.machine}/heartbeat", client=shop.machine_client, **body)
+    with psycopg.connect(shop.server.database.dsn) as connection:
+        connection.execute("UPDATE machine_run SET begin = begin - interval '8 minutes' WHERE begin > %s", (now,))
+    (alarm,) = look(shop)
+    assert "23 min" in alarm["text"]
+    shop.read(0.1, shop.another("ring", tool_memory=7, average_memory=7))
+    assert due(shop)["minutes"] == 0, "the machine may have run for that part"
+    shop.read(0.1)
+    assert look(shop) == []
+
+
 def test_of_parts_that_nothing_tells_of_none_is_missed(shop: Shop, other: str) -> None:
     plan(shop, every=1)
     shop.push([0.1] * 3)
