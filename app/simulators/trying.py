@@ -12,6 +12,8 @@ from datetime import UTC, datetime
 from random import Random
 from typing import Any
 
+import httpx
+
 from app.simulators.demo import plant
 from app.simulators.demo.running import Line, Pace
 from app.simulators.demo.simulation import Machine
@@ -92,12 +94,28 @@ def is_running(machine: str) -> bool:
     return machine in _running
 
 
-def start(url: str, secret: str, machine: str) -> None:
-    """Let the machine with this key run in a thread of its own until it is removed or the process ends."""
+class Named(httpx.HTTPTransport):
+    """Calls an address under another host name: by it a server of several plants knows whose request it is."""
+
+    def __init__(self, host: str) -> None:
+        super().__init__(trust_env=False)
+        self._host = host
+
+    def handle_request(self, request: httpx.Request) -> httpx.Response:
+        """Send it."""
+        request.headers["Host"] = self._host
+        return super().handle_request(request)
+
+
+def start(url: str, host: str, secret: str, machine: str) -> None:
+    """Let the machine with this key run in a thread of its own until it is removed or the process ends.
+
+    url: of this server as this computer reaches it. host: the name under which a browser reached it.
+    """
     if (other := _running.pop(machine, None)) is not None:
         other.set()
     ending = _running[machine] = threading.Event()
-    arguments = url, secret, machine, ending
+    arguments = url, host, secret, machine, ending
     threading.Thread(target=_run, args=arguments, name=f"simulated {machine}", daemon=True).start()
 
 
@@ -107,9 +125,9 @@ def stop(machine: str) -> None:
         ending.set()
 
 
-def _run(url: str, secret: str, machine: str, ending: threading.Event) -> None:
+def _run(url: str, host: str, secret: str, machine: str, ending: threading.Event) -> None:
     try:
-        with Client(url, secret, patience=PATIENCE, stop=ending) as gateway:
+        with Client(url, secret, patience=PATIENCE, stop=ending, transport=Named(host)) as gateway:
             spec = lathe(machine.removeprefix("simulated-"))
             run = datetime.now(UTC).strftime("%y%m%d%H%M%S")
             rng = Random(machine)  # noqa: S311 - a simulated machine, not cryptography

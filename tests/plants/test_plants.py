@@ -187,10 +187,18 @@ class TestAddresses:
         assert get(f"{server.url}/api/v1/machines", headers=headers).json()["items"] == []
         assert get(f"{server.url}/sign-in", headers=at_host).status_code == 200
         assert get(f"{server.url}/p/hosted/sign-in").status_code == 404
+        self._try_a_simulated_machine(server, headers)
 
         commands.remove_plant("hosted", data_dir=None, database_url=server.database.dsn)
         until(lambda: "hosted" not in get(f"{server.url}/plants").text)
         assert migrate.current(in_schema(server.database.dsn, "hosted")) == migrate.head()
+
+    @staticmethod
+    def _try_a_simulated_machine(server: Server, headers: dict[str, str]) -> None:
+        """It measures in the plant of this host name, whose address it calls from the same computer."""
+        assert httpx.post(f"{server.url}/simulated", headers=headers, verify=TLS, timeout=60).status_code == 303
+        until(lambda: get(f"{server.url}/api/v1/readings?limit=1", headers=headers).json()["items"])
+        assert httpx.post(f"{server.url}/simulated/remove", headers=headers, verify=TLS, timeout=60).status_code == 303
 
 
 class TestOverview:

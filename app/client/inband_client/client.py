@@ -28,6 +28,7 @@ class Client:
     of a role. patience: seconds for which a call is tried again after 5xx, 429, a time-out or a cut line, if trying again
     can do no harm; None for ever. timeout: seconds for one attempt. verify: the certificate of the authority that signed
     the server's, as a file (PEM), where it is one of your own. stop: an event of yours that ends all waiting, as `stop()`.
+    transport: what carries the requests, in place of connections of this client's own; `verify` is then the transport's.
 
     Every call raises `ProblemError`, `Unavailable` when patience has run out, and `Stopped`.
     """
@@ -41,8 +42,9 @@ class Client:
         timeout: float = TIMEOUT,
         verify: Verify = True,
         stop: threading.Event | None = None,
+        transport: httpx.BaseTransport | None = None,
     ) -> None:
-        self._http = httpx.Client(**options(url, key, verify=verify, timeout=timeout))
+        self._http = httpx.Client(transport=transport, **options(url, key, verify=verify, timeout=timeout))
         self._patience = patience
         self._stop = stop or threading.Event()
 

@@ -61,7 +61,7 @@ def start(request: Request, session: SessionDep, caller: Engineer) -> Response:
                 keys.revoke_machine_key(session, machine.key, old.id, caller.name)
     key = _set_up(session, program, caller.name) if machine is None else machine.key
     secret = add_key(session, name=KEY_NAME, machine=key, actor=caller.name).secret
-    begin = BackgroundTask(program.start, _own_address(request), secret, key)
+    begin = BackgroundTask(program.start, _own_address(request), request.headers.get("host", "localhost"), secret, key)
     return RedirectResponse("/", 303, background=begin)
 
 
