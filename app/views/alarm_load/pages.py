@@ -11,8 +11,9 @@ from app.core.period import Period
 from app.loop.alarm_response.wording import kind_word
 from app.loop.machines import queries as machines
 from app.views.alarm_load import queries, wording
-from app.web.choice import period_on_page
+from app.web.choice import in_address, period_on_page
 from app.web.deps import FROM_REPLICA, SessionDep, SettingsDep, Word
+from app.web.paging import address
 from app.web.templates import page
 
 router = APIRouter(include_in_schema=False, dependencies=[FROM_REPLICA])
@@ -27,11 +28,16 @@ def alarm_load_page(
     machine: Word = None,
 ) -> Response:
     """The load by alarms of each machine and the plant; the last 30 days where no period is named."""
+
+    def link(**changes: str | None) -> str:
+        return address("/alarms/load", **{"machine": machine or None, **in_address(period), **changes})
+
     return page(
         request,
         "alarms/load.html",
         load=queries.alarm_load(session, period, datetime.now(UTC), settings.bridge_silent_after, machine or None),
-        given=period,
+        period=period,
+        link=link,
         machines=machines.machines(session),
         core=core,
         wording=wording,
