@@ -92,7 +92,6 @@ def environment() -> Environment:
         grouped=numbers.grouped,
         when=numbers.when,
         as_field=period.field,
-        written=lambda at: times.written(at, times.MINUTES),
         ago=numbers.ago,
         in_short=short.in_short,
     )

@@ -17,7 +17,7 @@ import "./times.js";
 
 // What only some pages have is loaded where it stands: with the page, or with a live part that brings it.
 const SOMETIMES = [
-  ["plotly-chart", "./plotly-chart.js"], ["period-presets", "./period-presets.js"], ["table[data-sortable]", "./table-tools.js"],
+  ["plotly-chart", "./plotly-chart.js"], ["period-presets", "./period-presets.js"], ["table[data-sortable], table.as-cards", "./table-tools.js"],
   [".picker, .period-picker", "./pickers.js"], ["[data-term]", "./terms.js"],
 ];
 function load() {

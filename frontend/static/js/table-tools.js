@@ -4,6 +4,8 @@
 //   th[data-fixed]    a column that is not sorted
 //   td[data-value]    what is sorted by in place of the text
 //
+//   table.as-cards    on a phone its rows are cards: each cell gets the name of its column (data-label, components.css)
+//
 // Numbers sort as numbers (−12.5, 1,234.5 µm), times of <time-ago> by their moment, words as people sort them, a choice by what is
 // chosen. A second click turns the order. Without script the table is as the server made it. A live part that is fetched again keeps order and filter.
 
@@ -98,6 +100,18 @@ function equip(table) {
   }
 }
 
-const equipAll = () => document.querySelectorAll("table[data-sortable]").forEach(equip);
+const wordsOf = (head) =>
+  [...head.childNodes].filter((node) => !node.matches?.("[data-term]")).map((node) => node.textContent).join("").trim();
+
+function label(table) {
+  const names = [...(table.tHead?.rows[0].cells ?? [])].map(wordsOf);
+  for (const row of table.tBodies[0]?.rows ?? [])
+    for (const [column, cell] of [...row.cells].entries()) if (names[column]) cell.dataset.label ??= names[column];
+}
+
+const equipAll = () => {
+  document.querySelectorAll("table.as-cards").forEach(label); // before the heads become buttons
+  document.querySelectorAll("table[data-sortable]").forEach(equip);
+};
 equipAll();
 document.addEventListener("livepart", equipAll);
