@@ -75,5 +75,5 @@ def reason(found: Fitted) -> str:
 def caution(found: Fitted) -> str:
     """Readings that are not normal, and what carries their index instead."""
     return _(
-        "The readings are not normally distributed: the index is of the {name} that fits them ({goodness}); the ppm expected of a normal distribution are not valid."
+        "The readings are not normally distributed: the index is of the distribution that fits them, {name} ({goodness}); the ppm expected of a normal distribution are not valid."
     ).format(name=name(found.fit.family), goodness=goodness(found.fit))
