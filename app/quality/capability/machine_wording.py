@@ -39,7 +39,9 @@ def verdict(run: Run) -> str:
         else _("It is below the 1.67 that is usually asked of a machine.")
     )
     if run.result.by_fit is not None:
-        sentence += " " + _("By the distribution that fits: {name}.").format(name=fit_wording.name(run.result.by_fit.fit.family))
+        sentence += " " + _("By the distribution that fits: {name}.").format(
+            name=fit_wording.name(run.result.by_fit.fit.family)
+        )
     return sentence
 
 
