@@ -77,7 +77,8 @@ async def _allowance(request: Request, taken: Takes) -> Allowance:
     if taken.by == "anybody":
         return Allowance(taken.most, too_large(taken.most))
     if await device_at(request) is not None:
-        return Allowance(FORM, too_large(FORM))
+        most = taken.most if taken.pictures else FORM
+        return Allowance(most, too_large(most, pictures=taken.pictures))
     try:
         caller = await caller_of(request)
     except NotSignedIn as refusal:
@@ -85,7 +86,7 @@ async def _allowance(request: Request, taken: Takes) -> Allowance:
     wrong = _not_allowed(caller, taken)
     if wrong is not None:
         return Allowance(min(taken.most, DEFAULT.most), wrong)
-    return Allowance(taken.most, too_large(taken.most))
+    return Allowance(taken.most, too_large(taken.most, pictures=taken.pictures))
 
 
 def _not_allowed(caller: Caller, taken: Takes) -> NotAllowed | None:

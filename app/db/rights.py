@@ -25,6 +25,7 @@ APPEND_ONLY = frozenset(
         "kinematics_decision",
         "kinematics_run",
         "parameters_version",
+        "reaction_picture",
         "reaction_plan",
         "reading",
         "reading_context",
@@ -42,6 +43,7 @@ APPEND_ONLY = frozenset(
 WITH_A_LIFE = frozenset(
     {
         "alarm",
+        "alarm_photo",
         "api_key",
         "average_memory",
         "baseline",

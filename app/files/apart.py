@@ -56,10 +56,10 @@ _free = threading.BoundedSemaphore(MOST_AT_ONCE)
 _room: int | None = None  # bytes that this process may still write; None: no limit
 
 
-def apart(work: Callable[..., Result], *given: Any, limits: Limits | None = None) -> Result:
+def apart(work: Callable[..., Result], *given: Any, limits: Limits | None = None, remedy: str | None = None) -> Result:
     """The result of a function, called in a process of its own.
 
-    work: of a module that imports little. Raises what it raises of ours, `Unusable` at a limit, `TooManyRequests` while others
+    work: of a module that imports little. remedy: what to do at a limit, if not what a table is helped by. Raises what it raises of ours, `Unusable` at a limit, `TooManyRequests` while others
     are read, and `OSError` for a full disk.
     """
     limits = limits or LIMITS
@@ -71,7 +71,7 @@ def apart(work: Callable[..., Result], *given: Any, limits: Limits | None = None
         with TemporaryDirectory(prefix=PREFIX) as name:
             folder = Path(name)
             (folder / "task").write_bytes(pickle.dumps((limits, current_language(), work, given)))
-            return _result(folder / "result", _run(folder, limits), limits, work)  # type: ignore[no-any-return]
+            return _result(folder / "result", _run(folder, limits), limits, work, remedy)  # type: ignore[no-any-return]
     finally:
         _free.release()
 
@@ -96,12 +96,13 @@ def _run(folder: Path, limits: Limits) -> int:
         return OUT_OF_TIME
 
 
-def _result(path: Path, code: int, limits: Limits, work: Callable[..., Any]) -> Any:
+def _result(path: Path, code: int, limits: Limits, work: Callable[..., Any], remedy: str | None) -> Any:
     if code == DISK_FULL:
         raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
     if code:
-        remedy = _("Part it into several files, or import it with `inband import` at the server.")
-        raise Unusable(f"{_reason(code, limits)} {remedy}")
+        if remedy is None:
+            remedy = _("Part it into several files, or import it with `inband import` at the server.")
+        raise Unusable(f"{_reason(code, limits)} {remedy}".rstrip())
     done, outcome = pickle.loads(path.read_bytes())  # noqa: S301 - see above
     if done:
         return outcome

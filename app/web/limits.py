@@ -24,10 +24,14 @@ By = Literal["anybody", "caller", "viewer", "operator", "engineer", "admin"]
 
 
 class Takes(NamedTuple):
-    """Body that a route takes: at most N bytes. by: the least role of those who may send more than `DEFAULT`."""
+    """Body that a route takes: at most N bytes. by: the least role of those who may send more than `DEFAULT`.
+
+    pictures: it holds them, and comes from devices that are bound to a machine as well.
+    """
 
     most: int
     by: By
+    pictures: bool = False
 
 
 DEFAULT = Takes(MEGABYTE, "caller")
@@ -35,11 +39,11 @@ Endpoint = TypeVar("Endpoint", bound=Callable[..., Any])
 _declared: dict[Callable[..., Any], Takes] = {}
 
 
-def takes(most: int, by: By = "caller") -> Callable[[Endpoint], Endpoint]:
+def takes(most: int, by: By = "caller", *, pictures: bool = False) -> Callable[[Endpoint], Endpoint]:
     """Declare the largest body of a route, under the decorator of its router. by: "anybody" for what strangers may send."""
 
     def declare(endpoint: Endpoint) -> Endpoint:
-        _declared[endpoint] = Takes(most, by)
+        _declared[endpoint] = Takes(most, by, pictures)
         return endpoint
 
     return declare
@@ -50,10 +54,10 @@ def taken_by(endpoint: Callable[..., Any]) -> Takes | None:
     return _declared.get(endpoint)
 
 
-def too_large(most: int) -> TooLarge:
+def too_large(most: int, *, pictures: bool = False) -> TooLarge:
     """The refusal of a body of more bytes than these."""
     size = f"{most // MEGABYTE} MB" if most >= MEGABYTE else f"{most // KILOBYTE} kB"
     return TooLarge(
         _("The request is larger than the {limit} that are taken here.").format(limit=size),
-        _("Send it in several smaller requests."),
+        _("Send smaller pictures, or fewer at once.") if pictures else _("Send it in several smaller requests."),
     )

@@ -87,6 +87,8 @@ ADDED_TABLES = {
     "reaction_plan",
     "catalogue_entry",
     "thermal_expansion",
+    "reaction_picture",
+    "alarm_photo",
 }
 
 

@@ -7,6 +7,7 @@ from tests.conftest import Server
 from tests.geometry.alignment.test_alignments import SIX
 from tests.geometry.geometric_form.test_forms import BORE
 from tests.geometry.rotary_axes.bench import axis
+from tests.pictures import as_json, picture
 from tests.quality.control_charts.line import Line
 from tests.shop import Shop
 from tests.waits import until
@@ -384,7 +385,13 @@ def _with_plan(made: Shop) -> None:
         "id"
     ]
     made.call("POST", "/reactions/catalogue", 201, sort="action", name="Insert turned")
-    steps = [{"text": "Set the part aside."}, {"text": "Look at the edge " + "with the loupe, from all sides, " * 5}]
+    drawing = as_json(picture(size=(1200, 500)))
+    shown = {"digest": made.call("POST", "/reactions/pictures", 201, **drawing)["digest"], "alt": "A chipped edge"}
+    made.call("POST", f"/alarms/{made.alarms()[0]['id']}/photos", 201, **drawing)
+    steps = [
+        {"text": "Set the part aside.", "picture": shown},
+        {"text": "Look at the edge " + "with the loupe, from all sides, " * 5},
+    ]
     body: dict[str, Any] = {"characteristic": made.alarms()[0]["characteristic"], "steps": steps, "reason": "New"}
     made.call("POST", "/reactions/plans", 201, name="Edge broken", **body)
     made.read(20.0, made.another("seat"))

@@ -41,6 +41,7 @@ PARTS = {  # only ever fetched into a page
     "/setup/fit",
     "/setup/natural",
     "/station/{machine}/events",
+    "/station/{machine}/pictures/{picture}",
     "/characteristics/{characteristic}/readings/{sequence}/panel",
 }
 # Pages that are worked beside the machine, with gloves. Reading 3 has the dialog of a measurement by hand.

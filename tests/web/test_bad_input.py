@@ -111,6 +111,9 @@ BODIES: dict[str, dict[str, Any]] = {
     "POST /api/v1/reactions/plans": REACTION | {"characteristic": "{characteristic}", "rule": "nelson_1"},
     "PUT /api/v1/reactions/plans/{plan}": REACTION | {"characteristic": "{characteristic}", "kind": "hunting"},
     "POST /api/v1/reactions/plans/{plan}/withdraw": WHY,
+    "POST /api/v1/reactions/pictures": example_of("PictureIn"),
+    "POST /api/v1/alarms/{alarm}/photos": example_of("PictureIn"),
+    "POST /api/v1/alarms/{alarm}/photos/{photo}/remove": WHY,
     "POST /api/v1/reactions/catalogue": {"sort": "cause", "name": "Chip on the stylus"},
     "PATCH /api/v1/reactions/catalogue/{entry}": {"retired": False},
     "POST /api/v1/readings/aqdef": {"name": "bad.dfq", "content": AQDEF},
@@ -577,12 +580,15 @@ class Place:
             "route": 1,
             "plan": shop.call("POST", "/reactions/plans", 201, **self.reaction(shop))["id"],
             "entry": shop.call("POST", "/reactions/catalogue", 201, sort="action", name=shop.machine)["id"],
+            "picture": shop.call("POST", "/reactions/pictures", 201, **example_of("PictureIn"))["digest"],
             "screen": shop.call("POST", "/wall-screens", 201, name="Hall")["id"],
             "delivery": 1,
             "form": "csv",
             "person": next(person[name] for name in ("id", "name", "key") if name in person),
             "key": shop.call("POST", f"/machines/{shop.machine}/keys", 201, name="second")["id"],
         }
+        photos = f"/alarms/{self.values['alarm']}/photos"
+        self.values["photo"] = shop.call("POST", photos, 201, **example_of("PictureIn"))["id"]
         set_aside = shop.call("POST", "/quarantines", 201, alarm=self.values["alarm"], reason="Edge broken")
         self.values["quarantine"] = set_aside["id"]
         zero = BODIES["POST /api/v1/work-zeros"] | {"machine": shop.machine, "key": None}

@@ -2,23 +2,28 @@
 
 from typing import Annotated
 
-from fastapi import Path, Query
+from fastapi import Path, Query, Request, Response
 
-from app.access.deps import AnyCaller, Operator
-from app.loop.alarm_response import queries
+from app.access.deps import AnyCaller, Engineer, Operator
+from app.errors import NotFound
+from app.language.i18n import _
+from app.loop.alarm_response import photo_actions, photo_queries, queries
 from app.loop.alarm_response.queries import AlarmRow, AlarmState
 from app.loop.alarm_response.reaction_queries import Reactions
-from app.loop.alarm_response.schemas import AlarmOut, alarm_out
+from app.loop.alarm_response.schemas import AlarmOut, AlarmPhotoOut, alarm_out
 from app.loop.alarm_response.verbs import ACKNOWLEDGE, OfAlarm
 from app.loop.characteristics.queries import characteristic_named
 from app.loop.machines.queries import only_machine
 from app.web.api import After, Limit, api_router, problems
 from app.web.deps import SessionDep
-from app.web.fields import Page, Slug, Text200, page_of
+from app.web.fields import LARGEST_ID, Page, ReasonIn, Slug, Text200, answer_from, page_of
+from app.web.limits import takes
+from app.web.pictures import AS_JSON, FILE, PictureIn, decoded, picture_of, served
 from app.web.verb import draw
 
 router = api_router("alarms")
 Number = Annotated[int, Path(description="Number of the alarm.", examples=[41])]
+PhotoNumber = Annotated[int, Path(ge=1, le=LARGEST_ID, description="Number of the photo.", examples=[3])]
 
 
 @router.get("/alarms", responses=problems(404))
@@ -66,3 +71,55 @@ def _answer(on: OfAlarm, row: AlarmRow) -> AlarmOut:
 
 
 draw(router, "/alarms/{alarm}/acknowledge", ACKNOWLEDGE, _alarm, _answer, AlarmOut)
+
+
+@router.get("/alarms/{alarm}/photos", responses=problems(404))
+def list_photos_of_alarm(
+    session: SessionDep, caller: AnyCaller, alarm: Number, after: After = 0, limit: Limit = 100
+) -> Page[AlarmPhotoOut]:
+    """Photos of what was found at an alarm, in the order in which they came; removed ones without what they show."""
+    row = queries.alarm(session, alarm)
+    caller.must_at(row.alarm.machine_id, "viewer")
+    found = photo_queries.photos(session, row.alarm, after=after, limit=limit + 1)
+    return page_of([answer_from(AlarmPhotoOut, each) for each in found], limit, lambda photo: photo.id)
+
+
+@router.post("/alarms/{alarm}/photos", status_code=201, responses=problems(404, 409, 413))
+@takes(AS_JSON, by="operator", pictures=True)
+def add_photo_of_alarm(
+    session: SessionDep, caller: Operator, alarm: Number, given: PictureIn, response: Response
+) -> AlarmPhotoOut:
+    """Add a photo to an alarm, active or acknowledged; the same one sent twice is one.
+
+    409 where it has twelve. Acknowledging waits for no photo: a photo that is refused changes nothing of the alarm.
+    """
+    queries.alarm(session, alarm)
+    session.commit()  # nothing is kept open while the picture is read
+    row = photo_actions.add_photo(session, alarm, picture_of(decoded(given.content)), caller)
+    response.headers["Location"] = f"/api/v1/alarms/{alarm}/photos/{row.id}"
+    return answer_from(AlarmPhotoOut, row)
+
+
+@router.get(
+    "/alarms/{alarm}/photos/{photo}", responses=problems(404) | FILE, response_model=None, response_class=Response
+)
+def get_photo_of_alarm(
+    request: Request, session: SessionDep, caller: AnyCaller, alarm: Number, photo: PhotoNumber
+) -> Response:
+    """The photo itself, with its digest as `ETag`. 404 once it was removed."""
+    row, found = photo_queries.photo(session, alarm, photo)
+    caller.must_at(row.alarm.machine_id, "viewer")
+    if found.removed_at is not None:
+        raise NotFound(
+            _("{who} has removed this photo: {why}").format(who=found.removed_by, why=found.removed_why),
+            _("What it showed was deleted; nobody has it here any more."),
+        )
+    return served(request, found, "no-cache")
+
+
+@router.post("/alarms/{alarm}/photos/{photo}/remove", responses=problems(404, 409))
+def remove_photo_of_alarm(
+    session: SessionDep, caller: Engineer, alarm: Number, photo: PhotoNumber, given: ReasonIn
+) -> AlarmPhotoOut:
+    """Remove what a photo shows – a person, another firm's drawing –, for ever; that it was there, and why it went, stays."""
+    return answer_from(AlarmPhotoOut, photo_actions.remove_photo(session, alarm, photo, given.reason, caller))

@@ -8,17 +8,21 @@ from fastapi import APIRouter, Query, Request, Response
 from sqlalchemy.orm import Session
 from starlette.responses import RedirectResponse
 
-from app.access.deps import Caller, Operator, Viewer, require
+from app.access.deps import Caller, Engineer, Operator, Viewer, require
 from app.errors import Invalid
-from app.loop.alarm_response import queries, verbs, wording
+from app.loop.alarm_response import photo_actions, photo_queries, queries, verbs, wording
 from app.loop.alarm_response.outcomes import outcomes
 from app.loop.alarm_response.queries import AlarmRow
 from app.loop.alarm_response.reaction_queries import Reactions
 from app.loop.machines import queries as machines
 from app.web.deps import FormDep, Number, SessionDep, Sought, Word
+from app.web.fields import Reason
 from app.web.forms import by_field
+from app.web.limits import takes
 from app.web.paging import address, part_of
+from app.web.pictures import AS_FORM, FilesDep, picture_of, sent
 from app.web.templates import page
+from app.web.validation import checked
 
 router = APIRouter(include_in_schema=False)
 MOST_ON_BOARD = 100
@@ -68,6 +72,7 @@ def history(
     return page(
         request,
         "alarms/history.html",
+        photos=photo_queries.photo_counts(session, [row.alarm for row in rows]),
         part=part_of(rows, ON_HISTORY_PAGE, before, lambda row: row.alarm.id, link),
         q=q,
         machines=machines.machines(session),
@@ -109,6 +114,8 @@ def _alarm(
         "alarms/alarm.html",
         status=error.status if error else 200,
         row=row,
+        photos=photo_queries.photos(session, row.alarm),
+        most_photos=photo_actions.MOST_PHOTOS,
         action=confirmed_action,
         machine=machine,
         form=form or {},
@@ -131,3 +138,21 @@ def acknowledge(request: Request, session: SessionDep, caller: Operator, number:
             request, session, queries.alarm(session, number), caller, form.get("action"), machine, form, error
         )
     return RedirectResponse(address("/alarms", machine=machine, **{outcome.kind: number}), 303)
+
+
+@router.post("/alarms/{number}/photos")
+@takes(AS_FORM, by="operator", pictures=True)
+def add_photos(request: Request, session: SessionDep, caller: Operator, number: int, files: FilesDep) -> Response:
+    """Add photos, one or several; the script of the page sends each by itself and wants no page for an answer."""
+    queries.alarm(session, number)
+    session.commit()  # nothing is kept open while pictures are read
+    for picture in [picture_of(file.content, "photo") for file in files]:
+        photo_actions.add_photo(session, number, picture, caller)
+    return sent(request, f"/alarms/{number}#photos")
+
+
+@router.post("/alarms/{number}/photos/{photo}/remove")
+def remove_photo(session: SessionDep, caller: Engineer, number: int, photo: int, form: FormDep) -> Response:
+    """Remove what a photo shows."""
+    photo_actions.remove_photo(session, number, photo, checked(Reason, form.get("reason", ""), "reason"), caller)
+    return RedirectResponse(f"/alarms/{number}#photos", 303)

@@ -11,8 +11,18 @@ from app.loop.alarm_response.queries import AlarmRow
 from app.loop.alarm_response.reaction_queries import Reactions
 from app.loop.alarms.kinds import Action
 from app.web.fields import LARGEST_ID, Body, Reason, Text200, answer_from
+from app.web.pictures import PictureFields
 
 EntryNumber = Annotated[int, Field(strict=True, ge=1, le=LARGEST_ID)]
+
+
+class AlarmPhotoOut(PictureFields):
+    """A photo at an alarm. What it shows: `GET /alarms/{alarm}/photos/{photo}`."""
+
+    id: int
+    removed_at: Annotated[datetime | None, Field(description="Since then nobody can see it; null: it is there.")]
+    removed_by: Annotated[str | None, Field(description="Who removed it.")]
+    removed_why: Annotated[str | None, Field(description="Why it was removed.")]
 
 
 class AlarmAcknowledgeIn(Body):

@@ -4,12 +4,14 @@ from datetime import UTC, datetime
 from typing import Any
 
 from sqlalchemy import func, select
+from sqlalchemy.dialects.postgresql import insert
 from sqlalchemy.orm import Session
 
 from app.access.audit.actions import record
 from app.access.callers import Caller
 from app.db.events import publish
-from app.errors import Conflict, Invalid, NotFound
+from app.errors import Conflict, FieldError, Invalid, NotFound
+from app.files.pictures import Picture
 from app.language.i18n import _
 from app.loop.alarm_response.reaction_queries import plans_in_force, scope_of
 from app.loop.alarms.kinds import kinds
@@ -17,9 +19,10 @@ from app.loop.characteristics.queries import characteristic_named
 from app.loop.notifications import queries as notifications
 from app.loop.reactions import queries
 from app.loop.reactions.schemas import CatalogueEntryIn, PlanFields, ReactionPlanIn
-from app.loop.tables.reactions import PLAN_NUMBERS, CatalogueEntry, ReactionPlan
+from app.loop.tables.reactions import PLAN_NUMBERS, CatalogueEntry, ReactionPicture, ReactionPlan
+from app.web.created import Created
 
-MOST_PLANS, MOST_ENTRIES = 500, 500
+MOST_PLANS, MOST_ENTRIES, MOST_PICTURES = 500, 500, 2000
 _CHANGED = {"kind": "reactions"}
 
 
@@ -57,7 +60,8 @@ def withdraw_plan(session: Session, number: int, reason: str, caller: Caller) ->
 
 
 def _fields(given: ReactionPlanIn) -> dict[str, Any]:
-    return given.model_dump(mode="json")
+    # a step without a picture is stored without one, as those were before there were any: the same makes no version
+    return given.model_dump(mode="json") | {"steps": [step.model_dump(exclude_none=True) for step in given.steps]}
 
 
 def _facts(row: ReactionPlan) -> dict[str, Any]:
@@ -74,6 +78,12 @@ def _check(session: Session, given: ReactionPlanIn, number: int | None) -> None:
     for receiver in given.receivers:
         if receiver not in there:
             raise NotFound(_("There is no receiver {number}.").format(number=receiver), _("Choose one of the list."))
+    named = {at: step.picture.digest for at, step in enumerate(given.steps) if step.picture is not None}
+    missing = set(named.values()) - queries.pictures_there(session, named.values())
+    if missing:
+        wrong = _("there is no such picture; send it to /reactions/pictures first")
+        places = [f"steps[{at}].picture.digest" for at, digest in named.items() if digest in missing]
+        raise Invalid(f"{places[0]}: {wrong}.", errors=[FieldError(place, wrong) for place in places])
     scope = (given.characteristic, given.kind, given.rule)
     for other in plans_in_force(session):
         if other.id != number and scope_of(other) == scope:
@@ -93,6 +103,24 @@ def _written(session: Session, row: ReactionPlan, caller: Caller, last: Reaction
     record(session, caller.name, f"reaction plan {done}", f"reaction-plan/{row.id}", before, _facts(row), row.reason)
     publish(session, _CHANGED)
     return row
+
+
+# --- pictures
+
+
+def add_picture(session: Session, picture: Picture, caller: Caller) -> Created[ReactionPicture]:
+    """Keep a picture for steps to name; one that is there already is not kept twice. Raises `Conflict` at `MOST_PICTURES`."""
+    queries.hold_plans(session)
+    same = session.get(ReactionPicture, picture.digest)
+    if same is not None:
+        return Created(same, again=True)
+    if (session.scalar(select(func.count()).select_from(ReactionPicture)) or 0) >= MOST_PICTURES:
+        raise Conflict(_("There are {n} pictures already.").format(n=MOST_PICTURES), _("Use one of those."))
+    values = picture.columns | {"made_by": caller.name}
+    made = session.scalars(insert(ReactionPicture).values(values).returning(ReactionPicture)).one()
+    about = {"digest": made.digest, "bytes": made.size, "media_type": made.media_type}
+    record(session, caller.name, "picture added", f"reaction-picture/{made.digest[:12]}", None, about)
+    return Created(made)
 
 
 # --- the catalogue

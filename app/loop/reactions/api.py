@@ -2,7 +2,7 @@
 
 from typing import Annotated
 
-from fastapi import Path, Query, Response
+from fastapi import Path, Query, Request, Response
 
 from app.access.deps import Engineer, require
 from app.loop.alarm_response.reaction_queries import plans_in_force
@@ -15,6 +15,7 @@ from app.loop.reactions.schemas import (
     CatalogueEntryOut,
     CauseShareOut,
     CausesOut,
+    ReactionPictureOut,
     ReactionPlanIn,
     ReactionPlanOut,
 )
@@ -23,6 +24,8 @@ from app.web.choice import InPeriod
 from app.web.deps import FROM_REPLICA, SessionDep
 from app.web.etags import TAGGED, guarded, tagged
 from app.web.fields import LARGEST_ID, Page, ReasonIn, Slug, Text200, page_of
+from app.web.limits import takes
+from app.web.pictures import AS_JSON, FILE, DigestPath, PictureIn, decoded, picture_of, served
 
 router = api_router("alarms")
 PlanNumber = Annotated[int, Path(ge=1, le=LARGEST_ID, description="Number of the plan.", examples=[1])]
@@ -81,6 +84,37 @@ def change_reaction_plan(
 def withdraw_reaction_plan(session: SessionDep, caller: Engineer, plan: PlanNumber, given: ReasonIn) -> ReactionPlanOut:
     """Take a plan out of force. Its versions stay, and alarms go on to show the one that they were handled with."""
     return ReactionPlanOut.of(actions.withdraw_plan(session, plan, given.reason, caller))
+
+
+@router.post(
+    "/reactions/pictures", status_code=201, responses=problems(409, 413) | {200: {"model": ReactionPictureOut}}
+)
+@takes(AS_JSON, by="engineer", pictures=True)
+def add_reaction_picture(
+    session: SessionDep, caller: Engineer, given: PictureIn, response: Response
+) -> ReactionPictureOut:
+    """Send a picture, which steps of plans name by its digest. 201; 200 where it is there already.
+
+    A picture is never changed, and stays as long as the versions that show it: for ever.
+    """
+    session.commit()  # nothing is kept open while the picture is read
+    done = actions.add_picture(session, picture_of(decoded(given.content)), caller)
+    if done.again:
+        response.status_code = 200
+    response.headers["Location"] = f"/api/v1/reactions/pictures/{done.row.digest}"
+    return ReactionPictureOut.of(done.row)
+
+
+@router.get(
+    "/reactions/pictures/{picture}",
+    dependencies=VIEWER,
+    responses=problems(404) | FILE,
+    response_model=None,
+    response_class=Response,
+)
+def get_reaction_picture(request: Request, session: SessionDep, picture: DigestPath) -> Response:
+    """A picture of a step, with its digest as `ETag`."""
+    return served(request, queries.picture(session, picture), "max-age=31536000, immutable")
 
 
 @router.get("/reactions/catalogue", dependencies=VIEWER)

@@ -1,6 +1,6 @@
 """Queries of plans, the catalogue, and acknowledged alarms by cause. Never writes."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from datetime import datetime
 from typing import Any, NamedTuple
 
@@ -14,7 +14,7 @@ from app.errors import NotFound
 from app.language.i18n import _
 from app.loop.alarms import ended_queries as endings
 from app.loop.tables.alarms import Alarm
-from app.loop.tables.reactions import CatalogueEntry, ReactionPlan
+from app.loop.tables.reactions import CatalogueEntry, ReactionPicture, ReactionPlan
 from app.loop.tables.readings import Reading
 
 MOST_ALARMS = 5_000
@@ -43,6 +43,19 @@ def versions(session: Session, number: int, before: int | None = None, limit: in
 def hold_plans(session: Session, _given: Mapping[str, Any] | None = None) -> None:
     """Let nobody else change plans until the transaction ends: no two may be for the same alarms."""
     session.execute(select(func.pg_advisory_xact_lock(7292)))
+
+
+def picture(session: Session, digest: str) -> ReactionPicture:
+    """A picture; what it shows is not read yet. Raises `NotFound`."""
+    found = session.get(ReactionPicture, digest)
+    if found is None:
+        raise NotFound(_("There is no such picture."), _("Name the `digest` of a picture that was sent before."))
+    return found
+
+
+def pictures_there(session: Session, digests: Iterable[str]) -> set[str]:
+    """Those of these pictures that are stored."""
+    return set(session.scalars(select(ReactionPicture.digest).where(ReactionPicture.digest.in_(list(digests)))))
 
 
 def catalogue(session: Session, after: int = 0, limit: int = 1000) -> Sequence[CatalogueEntry]:

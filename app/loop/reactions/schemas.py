@@ -9,8 +9,9 @@ from pydantic_core import PydanticCustomError
 from app.core.reaction import Share
 from app.core.spc.rules import RuleName
 from app.language.i18n import _
-from app.loop.tables.reactions import CatalogueEntry, ReactionPlan
+from app.loop.tables.reactions import CatalogueEntry, ReactionPicture, ReactionPlan
 from app.web.fields import LARGEST_ID, Body, Reason, Slug, Text200, answer_from, readable
+from app.web.pictures import Digest, PictureFields
 
 MOST_STEPS, MOST_RECEIVERS = 20, 50
 SIGNAL = "signal"
@@ -23,10 +24,21 @@ StepText = Annotated[
 ]
 
 
+class StepPicture(Body):
+    """A picture of a step."""
+
+    digest: Digest
+    alt: Annotated[
+        Text200,
+        Field(description="What the picture shows, for those who cannot see it."),
+    ]
+
+
 class ReactionStep(Body):
     """One step of a plan."""
 
     text: StepText
+    picture: Annotated[StepPicture | None, Field(description="Shown below the text; null: none.")] = None
 
 
 class PlanFields(Body):
@@ -80,6 +92,15 @@ class ReactionPlanOut(PlanFields):
     @classmethod
     def of(cls, row: ReactionPlan) -> Self:
         """A version of the table."""
+        return answer_from(cls, row)
+
+
+class ReactionPictureOut(PictureFields):
+    """A picture that steps can name by its digest."""
+
+    @classmethod
+    def of(cls, row: ReactionPicture) -> Self:
+        """A picture of the table."""
         return answer_from(cls, row)
 
 

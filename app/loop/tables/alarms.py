@@ -1,4 +1,4 @@
-"""Alarms and their acknowledgement.
+"""Alarms, their acknowledgement, and photos of what was found.
 
 While an alarm is active, the same trouble does not raise another: it adds to `count`. Numbers are
 global, so that an alarm can be named without its machine.
@@ -7,12 +7,13 @@ global, so that an alarm can be named without its machine.
 from datetime import datetime
 from typing import Any
 
-from sqlalchemy import BigInteger, ForeignKey, Index, Sequence, func, text
+from sqlalchemy import BigInteger, ForeignKey, ForeignKeyConstraint, Index, LargeBinary, Sequence, func, text
 from sqlalchemy.orm import Mapped, mapped_column
 
 from app.db.base import Base
 
 ALARM_NUMBERS = Sequence("alarm_id", metadata=Base.metadata)
+PHOTO_NUMBERS = Sequence("alarm_photo_id", metadata=Base.metadata)
 
 
 class Alarm(Base):
@@ -65,3 +66,30 @@ class Alarm(Base):
     corrective_action: Mapped[int | None] = mapped_column(BigInteger)
     reaction_plan: Mapped[int | None] = mapped_column(BigInteger)  # by which it was handled, and its version
     reaction_version: Mapped[int | None]
+
+
+class AlarmPhoto(Base):
+    """A photo of what was found at an alarm. It stays as the alarm does; once removed, without what it shows."""
+
+    __tablename__ = "alarm_photo"
+    __table_args__ = (
+        ForeignKeyConstraint(["machine_id", "alarm_id"], ["alarm.machine_id", "alarm.id"]),
+        Index("alarm_photo_alarm_key", "machine_id", "alarm_id", "digest", unique=True),
+    )
+
+    machine_id: Mapped[int] = mapped_column(primary_key=True, autoincrement=False)
+    id: Mapped[int] = mapped_column(
+        BigInteger, primary_key=True, server_default=text("nextval('alarm_photo_id')"), autoincrement=False
+    )
+    alarm_id: Mapped[int] = mapped_column(BigInteger)
+    digest: Mapped[str]
+    media_type: Mapped[str]
+    width: Mapped[int]
+    height: Mapped[int]
+    size: Mapped[int]  # bytes
+    content: Mapped[bytes | None] = mapped_column(LargeBinary, deferred=True)
+    made_at: Mapped[datetime] = mapped_column(server_default=func.now())
+    made_by: Mapped[str]
+    removed_at: Mapped[datetime | None]
+    removed_by: Mapped[str | None]
+    removed_why: Mapped[str | None]

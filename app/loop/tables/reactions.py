@@ -6,7 +6,7 @@ A plan is never overwritten: each change is a version, and an alarm names the on
 from datetime import datetime
 from typing import Any
 
-from sqlalchemy import BigInteger, CheckConstraint, Index, Sequence, func, text
+from sqlalchemy import BigInteger, CheckConstraint, Index, LargeBinary, Sequence, func, text
 from sqlalchemy.orm import Mapped, mapped_column
 
 from app.db.base import Base
@@ -32,6 +32,21 @@ class ReactionPlan(Base):
     receivers: Mapped[list[Any]]  # numbers of receivers of notifications
     ended: Mapped[bool]  # with this version the plan was withdrawn
     reason: Mapped[str]
+    made_at: Mapped[datetime] = mapped_column(server_default=func.now())
+    made_by: Mapped[str]
+
+
+class ReactionPicture(Base):
+    """A picture that steps of plans name by its `digest`, so that it is stored once, however many versions show it."""
+
+    __tablename__ = "reaction_picture"
+
+    digest: Mapped[str] = mapped_column(primary_key=True)
+    media_type: Mapped[str]
+    width: Mapped[int]
+    height: Mapped[int]
+    size: Mapped[int]  # bytes
+    content: Mapped[bytes] = mapped_column(LargeBinary, deferred=True)
     made_at: Mapped[datetime] = mapped_column(server_default=func.now())
     made_by: Mapped[str]
 

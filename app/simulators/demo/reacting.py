@@ -1,7 +1,8 @@
-"""Reaction plans of the demonstration plant, and the cause that its operator chooses at each kind of alarm."""
+"""Reaction plans of the demonstration plant with pictures at their steps, and the cause that its operator chooses at each kind of alarm."""
 
 from typing import Any
 
+from app.simulators.demo import drawing
 from inband_client import Client
 
 NAME = "Demonstration: "
@@ -26,6 +27,11 @@ STEPS = {
         "The same size again: measure it by hand and call the shift leader.",
     ),
 }
+PICTURES = {
+    "tool_worn": (1, drawing.chipped_edge, "An insert in its seat; a chip is out of its edge, marked in red"),
+    "probe_fault": (0, drawing.dirty_stylus, "The ball of a stylus with a drop of coolant on it, marked in red"),
+}
+"""A picture for one step of a plan: its place, what draws it, and what it shows."""
 
 
 def set_up(admin: Client) -> dict[str, int]:
@@ -38,6 +44,14 @@ def set_up(admin: Client) -> dict[str, int]:
     for kind, steps in STEPS.items():
         if (None, kind, None) not in planned:
             body: dict[str, Any] = {"name": NAME + kind.replace("_", " "), "kind": kind}
-            body |= {"steps": [{"text": step} for step in steps], "reason": "First version"}
+            described: list[dict[str, Any]] = [{"text": step} for step in steps]
+            place, draw, alt = PICTURES[kind]
+            described[place]["picture"] = {"digest": _picture(admin, draw()), "alt": alt}
+            body |= {"steps": described, "reason": "First version"}
             admin.post("/reactions/plans", body)
     return {kind: there[name] for kind, name in CAUSES.items()}
+
+
+def _picture(admin: Client, content: str) -> str:
+    digest: str = admin.post("/reactions/pictures", {"content": content})["digest"]
+    return digest

@@ -14,6 +14,7 @@ from datetime import UTC, datetime, timedelta
 from random import Random
 from typing import Any
 
+from app.simulators.demo import drawing
 from app.simulators.demo.simulation import Machine, Probe
 from inband_client import Client, Conflict, Correction, ProblemError, Reading, Stopped
 
@@ -72,7 +73,7 @@ class Line:
         self._causes = causes  # numbers of the catalogue by kind of alarm
         self._changed_at: dict[int, str | None] = {}
         self._fault_told = False  # the machine was ordered to stop because of what its dirty stylus measured
-        self._set_aside = False
+        self._set_aside = self._photographed = False
         self._patience: dict[str, float] = {}  # what waits for a person, and until when we leave it to others
         self.pace = Pace(1.0, datetime.now(UTC), 0.0)
 
@@ -290,6 +291,10 @@ class Line:
             if alarm["kind"] in SETS_ASIDE and not self._set_aside:
                 self._set_aside = True
                 self._operator.post("/quarantines", {"alarm": alarm["id"], "reason": reason}, repeat=True)
+            if alarm["kind"] == "tool_worn" and not self._photographed:
+                self._photographed = True
+                photo = {"content": drawing.chipped_edge()}
+                self._operator.post(f"/alarms/{alarm['id']}/photos", photo, repeat=True)
             self._operator.post(f"/alarms/{alarm['id']}/acknowledge", body | self._measured_by_hand(alarm), repeat=True)
         except Conflict as first:
             log.info("%s: %s", self.key, first)

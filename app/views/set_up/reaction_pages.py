@@ -1,7 +1,8 @@
-"""Set-up pages: reaction plans with their versions, and the catalogue of causes and corrective actions."""
+"""Set-up pages: reaction plans with pictures and versions, and the catalogue of causes and corrective actions."""
 
+import re
 from collections.abc import Mapping
-from typing import Annotated, Any
+from typing import Annotated, Any, Literal
 
 from fastapi import APIRouter, Query, Request, Response
 from sqlalchemy.orm import Session
@@ -21,14 +22,21 @@ from app.loop.summaries.wording import rule_name
 from app.views.set_up.frame import setup_page
 from app.web.deps import FormDep, SessionDep
 from app.web.forms import by_field, parsed, typed
+from app.web.limits import MEGABYTE, takes
+from app.web.pictures import FilesDep, SentFile, picture_of
 
 router = APIRouter(include_in_schema=False)
 SPARE = 3  # empty steps at the end of the form
+MOST = 32 * MEGABYTE  # of a form with its pictures
+OF_STEP = re.compile(r"steps\[(\d+)\]\.(text|picture\.alt|picture)")
 
 
 @router.get("/setup/reactions")
-def reactions_page(request: Request, session: SessionDep, caller: Engineer) -> Response:
-    return _overview(request, session, caller)
+def reactions_page(
+    request: Request, session: SessionDep, caller: Engineer, sort: Literal["cause", "action"] = "cause"
+) -> Response:
+    """Plans and catalogue. sort: what was added last, for mostly another one follows."""
+    return _overview(request, session, caller, {"sort": sort})
 
 
 @router.post("/setup/reactions/catalogue")
@@ -36,10 +44,10 @@ def send_entry(request: Request, session: SessionDep, caller: Engineer, form: Fo
     """Add a cause or a corrective action."""
     try:
         with session.begin_nested():
-            actions.add_entry(session, typed(CatalogueEntryIn, form), caller)
+            row = actions.add_entry(session, typed(CatalogueEntryIn, form), caller)
     except InbandError as error:
         return _overview(request, session, caller, form, error)
-    return RedirectResponse("/setup/reactions?done=added#catalogue", 303)
+    return RedirectResponse(f"/setup/reactions?done=added&sort={row.sort}#catalogue", 303)
 
 
 @router.post("/setup/reactions/catalogue/{entry}")
@@ -79,8 +87,9 @@ def new_plan(request: Request, session: SessionDep, caller: Engineer) -> Respons
 
 
 @router.post("/setup/reactions/new")
-def send_new_plan(request: Request, session: SessionDep, caller: Engineer, form: FormDep) -> Response:
-    return _send(request, session, caller, form)
+@takes(MOST, by="engineer", pictures=True)
+def send_new_plan(request: Request, session: SessionDep, caller: Engineer, form: FormDep, files: FilesDep) -> Response:
+    return _send(request, session, caller, form, files)
 
 
 @router.get("/setup/reactions/{plan}")
@@ -97,24 +106,55 @@ def plan_page(
 
 
 @router.post("/setup/reactions/{plan}")
-def send_plan(request: Request, session: SessionDep, caller: Engineer, plan: int, form: FormDep) -> Response:
-    return _send(request, session, caller, form, queries.plan(session, plan))
+@takes(MOST, by="engineer", pictures=True)
+def send_plan(
+    request: Request, session: SessionDep, caller: Engineer, plan: int, form: FormDep, files: FilesDep
+) -> Response:
+    return _send(request, session, caller, form, files, plan)
 
 
-def _send(request: Request, session: Session, caller: Caller, form: Mapping[str, str], row: Any = None) -> Response:
-    done = "added" if row is None else "changed"
+def _send(
+    request: Request,
+    session: Session,
+    caller: Caller,
+    form: Mapping[str, str],
+    files: list[SentFile],
+    number: int | None = None,
+) -> Response:
+    """Write a version. A form that has to be corrected keeps its pictures: they are stored before."""
+    done = "added" if number is None else "changed"
+    row = None if number is None else queries.plan(session, number)
     try:
+        form = _with_pictures(session, form, files, caller)
+        if form.get("do") == "more":
+            return _plan(request, session, caller, form, row, more=SPARE)
         with session.begin_nested():
+            given = parsed(ReactionPlanIn, _read(form))
             if row is None:
-                actions.add_plan(session, parsed(ReactionPlanIn, _read(form)), caller)
+                actions.add_plan(session, given, caller)
             elif form.get("do") == "withdraw":
-                given = parsed(ReactionPlanIn, _read(form))
                 actions.withdraw_plan(session, row.id, given.reason, caller)
             else:
-                actions.change_plan(session, row.id, parsed(ReactionPlanIn, _read(form)), caller)
+                actions.change_plan(session, row.id, given, caller)
     except InbandError as error:
         return _plan(request, session, caller, form, row, error)
     return RedirectResponse(f"/setup/reactions?done={done}", 303)
+
+
+def _with_pictures(
+    session: Session, form: Mapping[str, str], files: list[SentFile], caller: Caller
+) -> Mapping[str, str]:
+    if not files:
+        return form
+    session.commit()  # nothing is kept open while pictures are read
+    read = [(file.field.removeprefix("picture-"), picture_of(file.content, file.field)) for file in files]
+    digests = {at: actions.add_picture(session, picture, caller).row.digest for at, picture in read}
+    session.commit()
+    return {
+        **form,
+        **{f"digest-{at}": digest for at, digest in digests.items()},
+        **{f"without-{at}": "" for at in digests},
+    }
 
 
 def _plan(
@@ -124,11 +164,21 @@ def _plan(
     form: Mapping[str, str],
     row: Any = None,
     error: InbandError | None = None,
+    more: int = 0,
 ) -> Response:
-    errors = by_field(error) if error else {}
+    places = _places(form)
+
+    def at(field: str, message: str) -> tuple[str, str]:
+        found = OF_STEP.match(field)
+        if found is None or int(found[1]) >= len(places):
+            return field, message
+        name = {"text": "step", "picture.alt": "alt"}.get(found[2], "picture")
+        return f"{name}-{places[int(found[1])]}", message
+
+    errors = by_field(error, at) if error else {}
+    shown = form.get("shown", "")
     steps = max(
-        (int(name[5:]) for name, text in form.items() if name[:5] == "step-" and name[5:].isdecimal() and text),
-        default=0,
+        places[-1] + SPARE if places else SPARE, int(shown) + more if shown.isdecimal() and len(shown) < 3 else 0
     )
     return setup_page(
         request,
@@ -149,7 +199,8 @@ def _plan(
             for each in characteristics.characteristics(session, limit=100_000)
         ],
         receivers=notifications.receivers(session),
-        steps=range(1, min(steps + SPARE, MOST_STEPS) + 1),
+        steps=range(1, min(steps, MOST_STEPS) + 1),
+        most_steps=MOST_STEPS,
         words=wording,
     )
 
@@ -159,7 +210,7 @@ def _read(form: Mapping[str, str]) -> dict[str, Any]:
     return {
         **{name: form.get(name, "") for name in ("name", "characteristic", "kind", "rule", "reason")},
         **{name: form.get(name) == "true" for name in ("cause_needed", "action_needed")},
-        "steps": [{"text": text} for at in range(1, MOST_STEPS + 1) if (text := form.get(f"step-{at}", "").strip())],
+        "steps": [_step(form, at) for at in _places(form)],
         "receivers": [
             int(field[9:])
             for field, value in form.items()
@@ -168,9 +219,27 @@ def _read(form: Mapping[str, str]) -> dict[str, Any]:
     }
 
 
+def _places(form: Mapping[str, str]) -> list[int]:
+    """The steps that are filled in, by their place in the form."""
+    return [at for at in range(1, MOST_STEPS + 1) if form.get(f"step-{at}", "").strip() or _digest(form, at)]
+
+
+def _digest(form: Mapping[str, str], at: int) -> str:
+    return "" if form.get(f"without-{at}") == "true" else form.get(f"digest-{at}", "")
+
+
+def _step(form: Mapping[str, str], at: int) -> dict[str, Any]:
+    step: dict[str, Any] = {"text": form.get(f"step-{at}", "").strip()}
+    digest = _digest(form, at)
+    return step | ({"picture": {"digest": digest, "alt": form.get(f"alt-{at}", "")}} if digest else {})
+
+
 def _fields(row: Any) -> dict[str, str]:
     """The form of a stored version."""
     fields = {name: getattr(row, name) or "" for name in ("name", "characteristic", "kind", "rule")}
     fields |= {name: "true" for name in ("cause_needed", "action_needed") if getattr(row, name)}
     fields |= {f"step-{at}": step["text"] for at, step in enumerate(row.steps, 1)}
+    for at, step in enumerate(row.steps, 1):
+        if step.get("picture"):
+            fields |= {f"digest-{at}": step["picture"]["digest"], f"alt-{at}": step["picture"]["alt"]}
     return fields | {f"receiver-{number}": "true" for number in row.receivers}

@@ -17,7 +17,6 @@ from app.access.new_keys import digest
 from app.access.sign_in import sign_out
 from app.errors import Conflict, InbandError, Invalid, NotFound
 from app.language.i18n import _
-from app.loop.alarm_response import queries as alarms
 from app.loop.alarm_response import verbs as alarm_verbs
 from app.loop.alarm_response import wording as alarm_wording
 from app.loop.alarm_response.outcomes import outcomes
@@ -35,7 +34,7 @@ from app.views.approvals.verbs import APPROVE_ALL, shown_in
 from app.views.approvals.verbs import OfTool as Together
 from app.views.characteristic.glance import band_picture
 from app.views.characteristic.wording import state_word
-from app.views.station import queries, sheet_pages
+from app.views.station import picture_pages, queries, sheet_pages
 from app.views.station.who import REFUSED, asked, who
 from app.views.station.wording import next_action
 from app.web.deps import SESSION_COOKIE, STATION_COOKIE, FormDep, Number, SessionDep, SettingsDep, Word, from_this_site
@@ -48,7 +47,7 @@ from app.web.templates import page
 from app.web.verb import Verb, carry_out, named, said
 
 router = APIRouter(prefix="/station", include_in_schema=False)
-router.routes += sheet_pages.router.routes
+router.routes += [*sheet_pages.router.routes, *picture_pages.router.routes]
 NO_FORM: Mapping[str, str] = {}
 NOBODY = Caller("person", "")
 """Asks the question; who acts is asked with it."""
@@ -124,8 +123,8 @@ def station_page(
         machine=station.machine,
         next_action=next_action(station),
         may_act=at.may_act,
-        done=_of_machine(session, station.machine.key, done) if done else None,
-        late=_of_machine(session, station.machine.key, late) if late else None,
+        done=queries.alarm_of_machine(session, station.machine.key, done) if done else None,
+        late=queries.alarm_of_machine(session, station.machine.key, late) if late else None,
         tool=verbs.done("change", tool) if tool else None,
         said=said((APPROVE_ALL,), decided, n) or verbs.done(decided, n) if decided and n else None,
         refused=verbs.too_late(session, station.machine, too_late, n) if too_late and n else None,
@@ -161,7 +160,7 @@ def ask_alarm(
 ) -> Response:
     """The second touch at an alarm. One that is acknowledged meanwhile leads back."""
     at.must_act()
-    row = _of_machine(session, machine, number)
+    row = queries.alarm_of_machine(session, machine, number)
     if row.alarm.acknowledged_at is not None:
         return RedirectResponse(address(f"/station/{machine}", late=number), 303)
     return _ask_alarm(request, session, at, row, action)
@@ -197,7 +196,7 @@ def acknowledge(
     request: Request, session: SessionDep, at: Station, machine: str, number: int, form: FormDep
 ) -> Response:
     """Acknowledge the alarm. Sent twice, or after somebody else, it changes nothing and says so."""
-    row = _of_machine(session, machine, number)
+    row = queries.alarm_of_machine(session, machine, number)
     try:
         outcome = alarm_verbs.acknowledge(session, number, form, who(request, session, at, form))
     except REFUSED as error:
@@ -369,17 +368,6 @@ def events(
     token, role = request.cookies.get(cookie), at.caller.role if at.caller else None
     granted = Access(digest(token) if token else None, at.caller.key_id if at.caller else None, role)
     return stream(request, granted, machine_named(session, machine).key, last_event_id, after)
-
-
-def _of_machine(session: Session, machine: str, number: int) -> AlarmRow:
-    """An alarm of this machine. Raises `NotFound`."""
-    row = alarms.alarm(session, number)
-    if row.machine.key != machine:
-        raise NotFound(
-            _("Alarm {number} is not of machine {machine}.").format(number=number, machine=machine),
-            _("Go back to the station of the machine."),
-        )
-    return row
 
 
 def _beginning_of(session: Session, machine: str, number: int) -> str | None:

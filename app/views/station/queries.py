@@ -6,6 +6,8 @@ from typing import NamedTuple
 from sqlalchemy.orm import Session
 
 from app.core.state import CharacteristicState
+from app.errors import NotFound
+from app.language.i18n import _
 from app.loop.alarm_response import queries as alarms
 from app.loop.alarm_response.queries import AlarmRow
 from app.loop.tables.machines import Machine
@@ -62,3 +64,14 @@ def _place(row: CharacteristicRow) -> tuple[bool, int, float]:
     last = row.stream.last_received_at
     measured = 0.0 if last is None else last.timestamp()
     return (not row.needs_someone, URGENCY[row.state] if row.needs_someone else 0, -measured)
+
+
+def alarm_of_machine(session: Session, machine: str, number: int) -> AlarmRow:
+    """An alarm of this machine. Raises `NotFound`."""
+    row = alarms.alarm(session, number)
+    if row.machine.key != machine:
+        raise NotFound(
+            _("Alarm {number} is not of machine {machine}.").format(number=number, machine=machine),
+            _("Go back to the station of the machine."),
+        )
+    return row

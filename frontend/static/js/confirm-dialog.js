@@ -6,6 +6,8 @@
 // Without script, or with a page that has no #confirm (signed out, done meanwhile), the link is simply followed.
 // What the page before has done (?done=, ?late=) leaves the address, so that loading it again does not say it again.
 
+import "./photo-box.js";
+
 const dialog = document.getElementById("confirm-dialog");
 let asking = false;
 

@@ -14,6 +14,7 @@ from app.access.identification import FREE
 from app.access.tables import Person as PersonOnRecord
 from tests.conftest import TLS, Server
 from tests.pages.looks import live
+from tests.pictures import picture
 from tests.shop import PASSWORD, Person, Shop
 
 PIN, BADGE = "2746", "0004711882"
@@ -305,6 +306,28 @@ class TestSecrets:
         assert "are removed" in admin.send(f"/setup/stations/badges/{number}/remove")
         tablet.shop.read(12.0)
         assert "Badge not known" in tablet.acknowledge(401, badge="7700112233")
+
+
+def test_photos_are_sent_by_the_person_who_acknowledges(tablet: Tablet, milica: Person) -> None:
+    tablet.shop.read(12.0)
+    number = tablet.shop.alarms()[0]["id"]
+    path = f"/alarms/{number}/photos"
+    found = re.search(r'name="csrf" content="([^"]+)"', tablet.open())
+    assert found is not None
+
+    def send(machine: str, size: int = 0, **who: str) -> httpx.Response:
+        files = {"photo": ("photo.jpg", picture("JPEG", (900, 600)) + bytes(size))}
+        head = {"X-Sent-By": "script"}
+        return tablet.browser.post(f"{machine}{path}", data={"csrf": found[1], **who}, files=files, headers=head)
+
+    assert send(tablet.here).status_code == 401
+    assert send(tablet.here, badge=BADGE, size=100_000).status_code == 204, "more than a form of a device"
+    (made,) = tablet.shop.call("GET", path)["items"]
+    assert (made["made_by"], made["width"]) == (milica.name, 900)
+    assert "photo-box" in tablet.open(f"/alarms/{number}?action=noted")
+    assert send(tablet.here, badge=BADGE, size=9_000_000).status_code == 413
+    other = Shop(tablet.shop.server)
+    assert send(f"/station/{other.machine}", badge=BADGE).status_code == 403
 
 
 @pytest.fixture

@@ -7,6 +7,7 @@ from app.db.period import in_period
 from app.files.documents.content import Column, Fact, Section, Table, count, deviation, moment, size, table_of, words
 from app.language.i18n import _
 from app.loop.alarm_response import wording as alarm_wording
+from app.loop.alarm_response.photo_queries import photo_counts
 from app.loop.characteristics import wording
 from app.loop.control_plan import queries as control_plan
 from app.loop.notes.queries import on_charts_of
@@ -41,6 +42,7 @@ def alarms(frame: Frame) -> Section:
         select(func.count()).select_from(Alarm).where(*here, Alarm.acknowledged_at.is_(None))
     )
     rows = frame.session.scalars(select(Alarm).where(*here).order_by(Alarm.id.desc()).limit(MOST_ROWS)).all()
+    photos = photo_counts(frame.session, rows)
     table = table_of(
         rows,
         (Column("number", _("Number"), 0.9, "right"), lambda row: count(row.id)),
@@ -56,6 +58,7 @@ def alarms(frame: Frame) -> Section:
             lambda row: words(alarm_wording.action_word(row.action) if row.action else ""),
         ),
         (Column("comment", _("Comment"), 1.5), lambda row: words(row.comment)),
+        (Column("photos", _("Photos"), 0.7, "right"), lambda row: count(photos.get(row.id))),
         more=total - len(rows),
     )
     facts = (
