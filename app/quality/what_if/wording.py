@@ -181,7 +181,7 @@ def sampled(sampling: Sampling) -> list[str]:
     if sampling.has_gaps:
         sentences.insert(
             1,
-            _("The control plan measures 1 in {n} parts already: the parts in between are missing here.").format(
+            _("The control plan measures 1 in {n} parts: of the time since, parts in between are missing here.").format(
                 n=sampling.plan.every
             ),
         )
