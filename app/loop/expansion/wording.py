@@ -16,7 +16,7 @@ def at_20_words(found: AtReference | Missing) -> str:
                 low=short(LOWEST), high=short(HIGHEST)
             ),
         }[found]
-    said = _("{correction} beside the measured size, which it was decided by.").format(
+    said = _("{correction} from the measured size, which the decision rests on.").format(
         correction=um(found.correction, 2)
     )
     if found.uncertainty is None:

@@ -23,12 +23,12 @@ def per(value: float, column: str) -> str:
     r"""An effect in µm with its unit.
 
     >>> per(0.00046, "temperature"), per(-0.0000123, "wear")
-    ('+0.46\xa0µm/K', '−0.012\xa0µm/part')
+    ('+0.46\xa0µm/K', '−0.0123\xa0µm/part')
     """
     if column == Column.TEMPERATURE:
         return f"{signed(value * 1000, 2)}{NO_BREAK_SPACE}µm/K"
     part = _("part")
-    return f"{signed(value * 1000, 3)}{NO_BREAK_SPACE}µm/{part}"
+    return f"{signed(value * 1000, 4)}{NO_BREAK_SPACE}µm/{part}"
 
 
 def left_out(why: LeftOut) -> str:

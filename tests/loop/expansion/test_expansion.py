@@ -62,7 +62,7 @@ def test_a_reading_has_its_size_at_20_degrees_beside_the_measured_one(shop: Shop
     assert first["uncertainty"] == pytest.approx(40 * 11.5e-6 * 0.5, abs=1e-6)
     page = Person(shop.server, "viewer").open(f"/characteristics/{shop.characteristic}/readings/1")
     assert "Size at 20 °C" in page
-    assert "beside the measured size, which it was decided by" in page
+    assert "from the measured size, which the decision rests on" in page
     expands(shop, **STEEL, scale_coefficient=11.5)
     assert at_20(shop)["correction"] == pytest.approx(-40 * 11.5e-6 * 2, abs=1e-6)
 
