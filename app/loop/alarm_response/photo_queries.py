@@ -38,9 +38,9 @@ def photo_counts(session: Session, alarms: Iterable[Alarm]) -> dict[int, int]:
         machines.setdefault(each.machine_id, []).append(each.id)
     if not machines:
         return {}
-    query = select(AlarmPhoto.alarm_id, func.count()).where(
+    query = select(AlarmPhoto.alarm_id, func.count().label("photos")).where(
         AlarmPhoto.machine_id.in_(machines),
         AlarmPhoto.alarm_id.in_([number for numbers in machines.values() for number in numbers]),
         AlarmPhoto.removed_at.is_(None),
     )
-    return dict(session.execute(query.group_by(AlarmPhoto.alarm_id)).tuples().all())
+    return {row.alarm_id: row.photos for row in session.execute(query.group_by(AlarmPhoto.alarm_id))}
