@@ -2,6 +2,7 @@
 
 description  what a chart shows: panels, marks, axes; colours by what they are for
 palette      which colour that is, in the light and in the dark
+strata       looks that tell series and strata apart
 plotly       in the browser: the dict of plotly.js
 paper        in reports: lines, areas and words (scales, marks), for PDF and SVG (svg)
 """
@@ -34,6 +35,7 @@ from app.charts.description import (
 from app.charts.palette import BANDS, PALETTES, Colour, Faded, Role, ThemeName
 from app.charts.paper import to_drawing
 from app.charts.plotly import to_plotly
+from app.charts.strata import look, told_apart
 from app.charts.svg import svg
 
 __all__ = [
@@ -63,10 +65,12 @@ __all__ = [
     "band",
     "bold",
     "empty",
+    "look",
     "nothing",
     "reading_axis",
     "svg",
     "time_axis",
     "to_drawing",
     "to_plotly",
+    "told_apart",
 ]

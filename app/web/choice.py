@@ -10,6 +10,8 @@ from fastapi import Depends, Query
 from pydantic import BeforeValidator, WithJsonSchema
 from pydantic_core import PydanticCustomError
 
+from app.core.context import Chosen as ChosenContext
+from app.core.context import ContextField
 from app.core.period import ALWAYS, Period
 from app.errors import FieldError, Invalid
 from app.files.formats import cell_values, periods
@@ -19,24 +21,35 @@ from app.web.fields import LARGEST_ID, Moment
 
 
 class Choice(NamedTuple):
-    """Chosen readings; `period`: of them those measured in it."""
+    """Chosen readings; `period`: of them those measured in it. context: only of those with these values in their context."""
 
     last: int | None = None
     first: int | None = None
     through: int | None = None
     period: Period = ALWAYS
+    context: ChosenContext = ()
 
     @property
     def everything(self) -> bool:
-        return self == Choice()
+        return self._replace(context=()) == Choice()
 
     @property
     def query(self) -> dict[str, Any]:
         """The choice as an address says it."""
+        return self.of_range | self.of_context
+
+    @property
+    def of_range(self) -> dict[str, Any]:
+        """The choice but for the context, as an address says it."""
         if self.everything:
             return {"last": "all"}
         named = {"last": self.last, "first": self.first, "through": self.through, **in_address(self.period)}
         return {name: value for name, value in named.items() if value is not None}
+
+    @property
+    def of_context(self) -> dict[str, str]:
+        """The context alone, as an address says it."""
+        return context_in_address(self.context)
 
 
 def _day(value: Any, *, end: bool) -> Any:
@@ -81,7 +94,36 @@ First = Annotated[int | None, Query(ge=1, le=LARGEST_ID, description="From this 
 Through = Annotated[int | None, Query(ge=1, le=LARGEST_ID, description="To this reading, itself included.")]
 
 
-def _choice(last: str | None, first: int | None, through: int | None, period: Period) -> Choice:
+def _of(field: ContextField) -> Any:
+    pattern = r"^[0-9]{0,6}$" if field is ContextField.NEST else r"^[^\x00-\x1f\x7f]{0,128}$"
+    words = f"Only readings with this {field.value} in their context."
+    return Query(alias=f"context.{field.value}", pattern=pattern, description=words, examples=[None])
+
+
+def context_in_query(
+    order: Annotated[str | None, _of(ContextField.ORDER)] = None,
+    batch: Annotated[str | None, _of(ContextField.BATCH)] = None,
+    nest: Annotated[str | None, _of(ContextField.NEST)] = None,
+    spindle: Annotated[str | None, _of(ContextField.SPINDLE)] = None,
+    fixture: Annotated[str | None, _of(ContextField.FIXTURE)] = None,
+    operator: Annotated[str | None, _of(ContextField.OPERATOR)] = None,
+    program: Annotated[str | None, _of(ContextField.PROGRAM)] = None,
+    gauge: Annotated[str | None, _of(ContextField.GAUGE)] = None,
+) -> ChosenContext:
+    """The context that is asked for; an empty field of a form asks for nothing."""
+    given = (order, batch, nest, spindle, fixture, operator, program, gauge)
+    return tuple((field, value) for field, value in zip(ContextField, given, strict=True) if value and value.strip())
+
+
+InContext = Annotated[ChosenContext, Depends(context_in_query)]
+
+
+def context_in_address(context: ChosenContext) -> dict[str, str]:
+    """The context as an address says it."""
+    return {f"context.{field.value}": value for field, value in context}
+
+
+def _choice(last: str | None, first: int | None, through: int | None, period: Period, context: ChosenContext) -> Choice:
     if first is not None and through is not None and first > through:
         message = _("is beyond the end of the range; exchange the two")
         raise Invalid(
@@ -90,23 +132,26 @@ def _choice(last: str | None, first: int | None, through: int | None, period: Pe
             errors=[FieldError("first", message)],
         )
     if last is None and first is None and through is None and not period.bounded:
-        return Choice(200)
-    return Choice(None if last in (None, "all") else int(last), first, through, period)
+        return Choice(200, context=context)
+    return Choice(None if last in (None, "all") else int(last), first, through, period, context)
 
 
-def chosen(period: InPeriod, last: Last = None, first: First = None, through: Through = None) -> Choice:
+def chosen(
+    period: InPeriod, context: InContext, last: Last = None, first: First = None, through: Through = None
+) -> Choice:
     """The readings by number, by time, or the last ones; the last 200 if nothing is said."""
-    return _choice(last, first, through, period)
+    return _choice(last, first, through, period, context)
 
 
 def chosen_on_page(
     period: Annotated[Period, Depends(period_on_page)],
+    context: InContext,
     last: Last = None,
     first: First = None,
     through: Through = None,
 ) -> Choice:
     """The same in the address of a page."""
-    return _choice(last, first, through, period)
+    return _choice(last, first, through, period, context)
 
 
 Chosen = Annotated[Choice, Depends(chosen)]

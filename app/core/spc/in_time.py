@@ -224,14 +224,15 @@ def decompose(groups: Sequence[ArrayLike], at: ArrayLike) -> Parts:
         lack_of_fit=between - regression,
         within=within,
         slope=slope,
-        means=_f(between, k - 1, within, n - k, reach),
-        line=_f(regression, 1, within, n - k, reach),
-        beside_line=_f(between - regression, k - 2, within, n - k, reach),
-        line_over_rest=_f(regression, 1, between - regression, k - 2, reach),
+        means=f_test(between, k - 1, within, n - k, reach),
+        line=f_test(regression, 1, within, n - k, reach),
+        beside_line=f_test(between - regression, k - 2, within, n - k, reach),
+        line_over_rest=f_test(regression, 1, between - regression, k - 2, reach),
     )
 
 
-def _f(squares: float, freedom: int, error: float, freedom_error: int, reach: float) -> Test:
+def f_test(squares: float, freedom: int, error: float, freedom_error: int, reach: float) -> Test:
+    """F of two sums of squares with their degrees of freedom; not a number without scatter. reach: the largest of the values."""
     if freedom <= 0 or not (error > 0 and varies(sqrt(error / freedom_error), reach)):
         return Test(nan, nan, freedom, freedom_error)
     ratio = (squares / freedom) / (error / freedom_error)
@@ -253,7 +254,7 @@ def brown_forsythe(groups: Sequence[ArrayLike]) -> Test:
     grand = float(sum(group.sum() for group in away)) / n
     between = sum(len(group) * (float(group.mean()) - grand) ** 2 for group in away)
     within = sum(float(((group - group.mean()) ** 2).sum()) for group in away)
-    return _f(between, k - 1, within, n - k, max(float(np.abs(group).max()) for group in arrays))
+    return f_test(between, k - 1, within, n - k, max(float(np.abs(group).max()) for group in arrays))
 
 
 def successive(values: ArrayLike) -> Test:

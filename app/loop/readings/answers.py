@@ -190,7 +190,10 @@ class ReadingContextOut(BaseModel):
 
     order: Annotated[str | None, Field(description="Number of the order.")] = None
     batch: Annotated[str | None, Field(description="Batch or charge of the material.")] = None
-    nest: Annotated[int | None, Field(description="Number of the nest, spindle or cavity.")] = None
+    nest: Annotated[int | None, Field(description="Number of the nest or cavity.")] = None
+    spindle: Annotated[str | None, Field(description="The spindle that cut the part.")] = None
+    fixture: Annotated[str | None, Field(description="The fixture, pallet or chuck in which it was cut.")] = None
+    program: Annotated[str | None, Field(description="The program that cut it.")] = None
     operator: Annotated[str | None, Field(description="Who measured.")] = None
     machine: Annotated[str | None, Field(description="The machine that made the part, as the sender calls it.")] = None
     gauge: Annotated[str | None, Field(description="What it was measured with.")] = None

@@ -36,8 +36,11 @@ class Context(Struct, forbid_unknown_fields=True, omit_defaults=True):
     order: Annotated[_Text | None, Meta(description="Number of the order.")] = None
     batch: Annotated[_Text | None, Meta(description="Batch or charge of the material.")] = None
     nest: Annotated[
-        Annotated[int, Meta(ge=0, le=999_999)] | None, Meta(description="Number of the nest, spindle or cavity.")
+        Annotated[int, Meta(ge=0, le=999_999)] | None, Meta(description="Number of the nest or cavity.")
     ] = None
+    spindle: Annotated[_Text | None, Meta(description="The spindle that cut the part.")] = None
+    fixture: Annotated[_Text | None, Meta(description="The fixture, pallet or chuck in which it was cut.")] = None
+    program: Annotated[_Text | None, Meta(description="The program that cut it.")] = None
     operator: Annotated[_Text | None, Meta(description="Who measured.")] = None
     machine: Annotated[_Text | None, Meta(description="The machine that made the part, as the sender calls it.")] = None
     gauge: Annotated[_Text | None, Meta(description="What it was measured with.")] = None
@@ -398,7 +401,9 @@ def _short_text() -> str:
     return _("a text of 1 to 128 characters")
 
 
-_MUST: dict[str, Callable[[], str]] = dict.fromkeys(("order", "batch", "operator", "machine", "gauge"), _short_text) | {
+_MUST: dict[str, Callable[[], str]] = dict.fromkeys(
+    ("order", "batch", "spindle", "fixture", "program", "operator", "machine", "gauge"), _short_text
+) | {
     "nest": lambda: _("a whole number from 0 to 999999"),
     "by_hand": lambda: _("true or false, without quotes"),
     "comment": lambda: _("a text of 1 to {most} characters").format(most=LONGEST_COMMENT),

@@ -3,6 +3,7 @@
 from collections.abc import Callable, Sequence
 from typing import Any
 
+from app.core.context import ContextField
 from app.core.decision.limits import Zone, nanometres, within_tolerance
 from app.core.decision.step import Code, average_of
 from app.core.parameters import Feature, Parameters
@@ -288,3 +289,17 @@ def touch_problem(error: TouchError) -> str:
                 "from the programmed dimension."
             )
     return text % values
+
+
+def field_word(field: str) -> str:
+    """A field of the context in a word."""
+    return {
+        ContextField.ORDER: _("Order"),
+        ContextField.BATCH: _("Batch"),
+        ContextField.NEST: _("Nest"),
+        ContextField.SPINDLE: _("Spindle"),
+        ContextField.FIXTURE: _("Fixture"),
+        ContextField.OPERATOR: _("Operator"),
+        ContextField.PROGRAM: _("Program"),
+        ContextField.GAUGE: _("Gauge"),
+    }[ContextField(field)]

@@ -1,5 +1,9 @@
 """The words of statistics: numbers, rules, charts, why there is no number, and what a number should not be read without."""
 
+from collections.abc import Mapping
+from typing import NamedTuple
+
+from app.core.context import Chosen, ContextField
 from app.core.spc.capability import Caution
 from app.core.spc.gauge.zero_range import Governs
 from app.core.spc.refusal import Reason, Refused
@@ -9,7 +13,45 @@ from app.core.spc.spread import Estimator
 from app.files.documents.content import Fact, count, deviation, share, width
 from app.language.i18n import _, ngettext
 from app.language.numbers import plain_um, um
+from app.loop.readings.wording import field_word
 from app.loop.summaries.queries import Numbers, Rejects, Unworn
+
+
+def context_words(context: Chosen) -> str:
+    """The values of a context in a line, empty where nothing is chosen."""
+    return ", ".join(f"{field_word(field)} {value}" for field, value in context)
+
+
+class ContextForm(NamedTuple):
+    """A form that narrows readings to a context, or tells them apart by a field of it.
+
+    fields: name, label, what is chosen, and the values to choose from. bys: fields to tell apart by; words: all that is chosen.
+    """
+
+    fields: list[tuple[str, str, str, list[str]]]
+    bys: list[tuple[str, str]]
+    by: str
+    words: str
+
+
+def context_form(
+    offered: Mapping[ContextField, list[str]], context: Chosen, by: ContextField | None = None
+) -> ContextForm | None:
+    """The form for readings whose newest have these values; None where no reading has any and nothing is chosen."""
+    chosen = dict(context)
+    fields = [field for field in ContextField if field in offered or field in chosen or field is by]
+    if not fields:
+        return None
+    words = [context_words(context), _("by {field}").format(field=field_word(by).lower()) if by else ""]
+    return ContextForm(
+        [
+            (f"context.{field.value}", field_word(field), chosen.get(field, ""), offered.get(field, []))
+            for field in fields
+        ],
+        [("", _("not told apart")), *((field.value, field_word(field)) for field in fields)],
+        by.value if by else "",
+        " · ".join(filter(None, words)),
+    )
 
 
 def facts(

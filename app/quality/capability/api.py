@@ -5,6 +5,7 @@ from typing import Annotated, Literal
 from fastapi import Query, Response
 
 from app.access.deps import AnyCaller
+from app.core.context import ContextField
 from app.core.spc.machine_performance import RUN
 from app.loop.characteristics import queries as characteristics
 from app.quality.capability.chart import drawn
@@ -17,6 +18,7 @@ from app.quality.capability.schemas import (
     capability_out,
     machine_performance_out,
 )
+from app.quality.capability.strata import StrataOut, strata_of, strata_out
 from app.quality.capability.verdict_queries import states
 from app.quality.capability.weekly import tool_changes, weeks_of
 from app.web.api import FIGURE, CharacteristicKey, Theme, api_router, chart_answer, problems
@@ -35,6 +37,23 @@ def get_capability(
     """
     current = characteristics.characteristic_for(session, caller, characteristic, "viewer")
     return capability_out(study_of(session, current, choice))
+
+
+@router.get("/characteristics/{characteristic}/strata", responses=problems(404))
+def get_strata(
+    session: SessionDep,
+    caller: AnyCaller,
+    characteristic: CharacteristicKey,
+    choice: StudyRequestDep,
+    by: Annotated[ContextField, Query(description="The field of the context that tells them apart.")],
+) -> StrataOut:
+    """The readings of a capability study apart by order, nest, operator …: mean, s and Ppk of each, and whether they differ.
+
+    The test compares neighbours, so that drift between two orders is not taken for a difference of the orders.
+    """
+    current = characteristics.characteristic_for(session, caller, characteristic, "viewer")
+    study = study_of(session, current, choice)
+    return strata_out(study, strata_of(session, study, by))
 
 
 @router.get("/characteristics/{characteristic}/machine-performance", responses=problems(404))

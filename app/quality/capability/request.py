@@ -5,6 +5,7 @@ from typing import Annotated, NamedTuple
 from fastapi import Depends, Query
 from sqlalchemy.orm import Session
 
+from app.core.context import Chosen
 from app.core.natural import NaturalLimit
 from app.core.period import Period
 from app.errors import Invalid
@@ -14,7 +15,7 @@ from app.loop.summaries import queries as statistics
 from app.quality.capability import queries
 from app.quality.capability.kinds import SigmaBy
 from app.quality.capability.queries import CONFIDENCE, COVERAGE, USUAL, Side, Study
-from app.web.choice import InPeriod
+from app.web.choice import InContext, InPeriod
 from app.web.fields import LARGEST_ID
 
 
@@ -27,6 +28,7 @@ class StudyRequest(NamedTuple):
     confidence: float
     coverage: float = COVERAGE
     sigma_by: SigmaBy = SigmaBy.NEIGHBOURS
+    context: Chosen = ()
 
 
 Last = Annotated[
@@ -57,6 +59,7 @@ OfSigma = Annotated[
 
 def study_request(
     period: InPeriod,
+    context: InContext,
     last: Last = None,
     side: OneSide = "both",
     confidence: Confidence = CONFIDENCE,
@@ -64,7 +67,7 @@ def study_request(
     sigma_by: OfSigma = SigmaBy.NEIGHBOURS,
 ) -> StudyRequest:
     """The choice of readings, the same for API and figures."""
-    return StudyRequest(last, period, side, confidence, coverage, sigma_by)
+    return StudyRequest(last, period, side, confidence, coverage, sigma_by, context)
 
 
 StudyRequestDep = Annotated[StudyRequest, Depends(study_request)]
@@ -85,6 +88,7 @@ def study_of(session: Session, current: CurrentCharacteristic, choice: StudyRequ
         current.characteristic,
         last=None if last == "all" else min(int(last), LARGEST_ID),
         period=choice.period,
+        context=choice.context,
         usable=choice.last is None,
     )
     return queries.capability_of(

@@ -12,6 +12,7 @@ from app.core.spc.stability import Fired, Stability
 from app.language.i18n import _, ngettext
 from app.language.numbers import beside, probability, signed, tolerance_um
 from app.loop.summaries import wording as statistics
+from app.loop.summaries.wording import context_words
 from app.quality.capability import fit_wording as fits
 from app.quality.capability.kinds import SigmaBy
 from app.quality.capability.queries import Study
@@ -78,7 +79,9 @@ def window_of(study: Study) -> str:
     """The window and the method of the number that may be quoted."""
     places = study.sequence
     first, last = (int(places[0]), int(places[-1])) if len(places) else (None, None)
-    return window(len(study.values), first, last, study.quote, preliminary=study.quoting.preliminary)
+    words = window(len(study.values), first, last, study.quote, preliminary=study.quoting.preliminary)
+    of = context_words(study.window.context)
+    return _("{window}, only {context}").format(window=words, context=of) if of else words
 
 
 def one_sided(study: Study) -> str | None:

@@ -7,6 +7,7 @@ from fastapi import Path, Query, Response
 from app.access.deps import AnyCaller, Engineer, require
 from app.charts import Chart as Figure
 from app.charts import ThemeName
+from app.core.context import ContextField
 from app.core.spc.quantity import Quantity
 from app.core.spc.shewhart import Chart
 from app.language.i18n import _
@@ -30,6 +31,7 @@ from app.quality.control_charts.schemas import (
     Grouping,
     PeriodIn,
 )
+from app.quality.control_charts.strata import told_apart_by
 from app.quality.control_charts.tables import Baseline
 from app.quality.control_charts.view import Marks
 from app.web.api import FIGURE, CharacteristicKey, Limit, Theme, Width, api_router, chart_answer, problems, sent_again
@@ -187,6 +189,10 @@ def get_control_chart(
     signal: Annotated[
         int | None, Query(ge=1, le=LARGEST_ID, description="Mark the run of this signal, not the baseline's period.")
     ] = None,
+    by: Annotated[
+        ContextField | None,
+        Query(description="Tell points apart by this field of their readings' context: colour, shape and legend."),
+    ] = None,
     theme: Theme = "light",
     width: Width = 1240,
 ) -> Response:
@@ -195,11 +201,13 @@ def get_control_chart(
     window = statistics.window_of(session, current.characteristic, **choice._asdict())
     baseline = _judge(session, current, version)
     if baseline is None:
-        unjudged = charts.unjudged(session, current, window)
-        return _with_events(session, current, control_figure(unjudged, key=characteristic, width=width), width, theme)
+        view = charts.unjudged(session, current, window)
+        figure = told_apart_by(session, current, view, control_figure(view, key=characteristic, width=width), by)
+        return _with_events(session, current, figure, width, theme)
     view = charts.view(session, current, baseline, window, chart)
     marked = charts.marked_by(baseline) if signal is None else _run_of(session, current, signal)
     figure = control_figure(view, key=characteristic, marked=marked, width=width)
+    figure = told_apart_by(session, current, view, figure, by)
     return _with_events(session, current, figure, width, theme)
 
 

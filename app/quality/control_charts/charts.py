@@ -71,9 +71,9 @@ def view(
     view = _drawn(session, current, baseline, window, kind, watched)
     left_out = view.left_out and view.left_out.within(window.first, window.last)
     view = replace(view, left_out=left_out, given=baseline.given)
-    if not window.timed:
+    if not window.narrowed:
         return view
-    # What a point is does not depend on the period; whether it is shown does.
+    # What a point is depends neither on the period nor on the context; whether it is shown does.
     measured = statistics.history_of(session, current.characteristic, window, ())["sequence"]
     view = only(view, np.isin(view.last, measured))
     return replace(view, left_out=view.left_out and view.left_out.among(measured))

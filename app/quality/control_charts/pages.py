@@ -11,6 +11,7 @@ from starlette.datastructures import FormData, UploadFile
 from starlette.responses import RedirectResponse
 
 from app.access.deps import Caller, Engineer, Viewer
+from app.core.context import ContextField
 from app.core.spc.quantity import Quantity
 from app.core.spc.refusal import Reason as Why
 from app.core.spc.refusal import Refused
@@ -137,11 +138,12 @@ def control_page(
     choice: ChosenOnPage,
     chart: Annotated[Remembering | None, Query()] = None,
     baseline: Annotated[int | None, Query(ge=1, le=LARGEST_SERIAL)] = None,
+    by: Annotated[ContextField | Literal[""], Query()] = "",
     x_live_part: Annotated[str | None, Header()] = None,
 ) -> Response:
     """The control charts by the baseline in force, or by an older one to compare."""
     current = characteristics.characteristic_named(session, characteristic)
-    return _control(request, session, caller, current, choice, chart, baseline, x_live_part)
+    return _control(request, session, caller, current, choice, chart, baseline, x_live_part, by=by or None)
 
 
 def _control(
@@ -154,6 +156,7 @@ def _control(
     version: int | None = None,
     part: str | None = None,
     *,
+    by: ContextField | None = None,
     error: InbandError | None = None,
 ) -> Response:
     key = current.characteristic.key
@@ -163,7 +166,9 @@ def _control(
         else queries.baseline_of(session, current.characteristic, version)
     )
     kind = Chart(chart) if chart and judge is not None and Chart(chart) in charts.kinds(judge) else None
-    chosen, kept = choice.query, {"chart": kind and kind.value, "baseline": version}
+    chosen = choice.query
+    kept = choice.of_context | {"chart": kind and kind.value, "baseline": version, "by": by and by.value}
+    offered = statistics.offered(session, current.characteristic) if part is None else {}
 
     def link(**changes: Any) -> str:
         """This page with something else chosen."""
@@ -172,7 +177,7 @@ def _control(
         return f"/characteristics/{key}/control?{urlencode(values)}"
 
     def figure(which: Chart | None) -> str:
-        values = chosen | {"chart": which and which.value, "baseline": version}
+        values = chosen | {"chart": which and which.value, "baseline": version, "by": by and by.value}
         query = {name: value for name, value in values.items() if value is not None}
         return f"/api/v1/characteristics/{key}/figures/control?{urlencode(query)}"
 
@@ -187,6 +192,7 @@ def _control(
         suits=suited(session, current) if part is None else None,
         choice=choice,
         kept=kept,
+        of_context=statistics_wording.context_form(offered, choice.context, by),
         tool_since=statistics.tool_since(session, current.characteristic) if part is None else None,
         chart=kind,
         version=version,

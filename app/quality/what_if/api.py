@@ -20,9 +20,11 @@ from app.quality.what_if.schemas import (
     ProposalOut,
     SampledIn,
     SampledOut,
+    WhatIfByIn,
     WhatIfIn,
     WhatIfOut,
 )
+from app.quality.what_if.strata import strata_of
 from app.web.api import FIGURE, Before, CharacteristicKey, Limit, Theme, Width, api_router, chart_answer, problems
 from app.web.choice import InPeriod
 from app.web.deps import SessionDep
@@ -40,14 +42,16 @@ Status = Annotated[
 @router.post(
     "/characteristics/{characteristic}/what-if", responses=problems(404, 429), dependencies=[require("viewer")]
 )
-def replay_readings(session: SessionDep, characteristic: CharacteristicKey, asked: WhatIfIn) -> WhatIfOut:
+def replay_readings(session: SessionDep, characteristic: CharacteristicKey, asked: WhatIfByIn) -> WhatIfOut:
     """Replay stored readings with other settings, side by side with today's; nothing is changed.
 
     The corrections in effect are taken out, the process without them is rebuilt, and the other policy is run in closed loop
-    on it. `likeness` says how far the rebuilt loop is to be believed. At most a million readings; two replays at once.
+    on it. `likeness` says how far the rebuilt loop is to be believed. At most a million readings; two replays at once. With
+    `by` the results of each order, nest … are beside those of all.
     """
     current = characteristics.characteristic_named(session, characteristic)
-    return WhatIfOut.of(simulation.replayed(session, current, asked))
+    answer = simulation.replayed(session, current, asked)
+    return WhatIfOut.of(answer, strata_of(session, answer, asked.by) if asked.by is not None else None)
 
 
 @router.post(

@@ -5,6 +5,7 @@ from datetime import datetime
 from typing import Any
 from urllib.parse import urlencode
 
+from app.core.context import ContextField
 from app.core.parameters import Parameters
 from app.core.period import Period
 from app.files.formats import cell_values, periods
@@ -16,7 +17,7 @@ from app.quality.what_if.schemas import MapIn, WhatIfIn
 from app.web.choice import in_address
 from app.web.forms import length, parsed
 
-FIELDS = ("k", "r33", "r34", "factor", "delay", "effect", "last", "from", "to", "goal")
+FIELDS = ("k", "r33", "r34", "factor", "delay", "effect", "last", "from", "to", "goal", "by")
 NAMES = {
     "k": "weighting_factor",
     "r33": "zero_range",
@@ -33,6 +34,7 @@ def typed_from(query: Mapping[str, str]) -> dict[str, str]:
     typed = {name: query.get(name, "").strip()[:40] for name in FIELDS}
     typed["effect"] = typed["effect"] or "1"
     typed["goal"] = typed["goal"] or "ppk"
+    typed["by"] = typed["by"] if typed["by"] in set(ContextField) else ""
     if not typed["last"] and not typed["from"] and not typed["to"]:
         typed["last"] = str(USUAL)
     return typed

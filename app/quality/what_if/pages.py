@@ -10,6 +10,7 @@ from sqlalchemy.orm import Session
 from starlette.responses import RedirectResponse
 
 from app.access.deps import Caller, Operator, Viewer, require
+from app.core.context import ContextField
 from app.core.policy_map import Criterion
 from app.errors import Conflict, InbandError, Invalid, TooManyRequests
 from app.language.i18n import _
@@ -17,6 +18,7 @@ from app.language.numbers import short
 from app.loop.characteristics import queries as characteristics
 from app.loop.characteristics.queries import CurrentCharacteristic
 from app.loop.machines import queries as machines
+from app.loop.readings.wording import field_word
 from app.loop.summaries import queries as summaries
 from app.quality.proof import queries as proof
 from app.quality.proof import wording as proof_wording
@@ -25,6 +27,7 @@ from app.quality.what_if.evidence import effect_of, period_of, quote_of
 from app.quality.what_if.map_view import view_of
 from app.quality.what_if.queries import Map, Sampling, Simulation
 from app.quality.what_if.schemas import ProposalDecisionIn, ProposalIn, SampledIn
+from app.quality.what_if.strata import strata_of
 from app.web.deps import Before, FormDep, SessionDep, Sought, Word
 from app.web.fields import LARGEST_ID
 from app.web.forms import by_field, parsed
@@ -77,6 +80,7 @@ def _what_if(
         problem, errors = error, form_reader.at_fields(by_field(error))
     changes = wording.changed(asdict(answer.past.current.parameters), actions.changes_of(answer)) if answer else []
     key, failing = current.characteristic.key, proof.failing()
+    offered = summaries.offered(session, current.characteristic)
     criterion = Criterion(typed["goal"]) if typed["goal"] in set(Criterion) else Criterion.PPK
     return page(
         request,
@@ -94,6 +98,10 @@ def _what_if(
         problem=problem,
         answer=answer,
         changes=changes,
+        bys=[(by.value, field_word(by)) for by in ContextField if by in offered or by == typed["by"]],
+        by=ContextField(typed["by"]) if typed["by"] else None,
+        strata=strata_of(session, answer, ContextField(typed["by"])) if answer and typed["by"] else [],
+        field_word=field_word,
         rows=_rows(answer, other=bool(changes)) if answer else [],
         gained=wording.gained(answer.today, answer.other) if answer else [],
         measured=effect_of(answer.effect) if answer else None,

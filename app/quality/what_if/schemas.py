@@ -5,6 +5,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, Field
 
+from app.core.context import ContextField
 from app.core.period import Period
 from app.core.policy_map import Criterion
 from app.core.replay import LONGEST_DELAY
@@ -13,6 +14,7 @@ from app.files.formats import periods
 from app.quality.what_if.evidence import cell_of, evidence_of, period_of, sampling_of
 from app.quality.what_if.proposals import ProposalRow
 from app.quality.what_if.queries import USUAL, Map, Sampling, Simulation
+from app.quality.what_if.strata import ReplayedStratum
 from app.web.choice import BEGINNING, ENDING, Beginning, Ending
 from app.web.fields import LARGEST_ID, Body, Reason, answer_from
 
@@ -98,6 +100,12 @@ class SampledIn(WhatIfIn):
     after_alarm: Annotated[
         Few | None, Field(description="The same after an alarm by a reading; null: as the control plan says.")
     ] = None
+
+
+class WhatIfByIn(WhatIfIn):
+    """The same, with the results apart by a field of the readings' context."""
+
+    by: Annotated[ContextField | None, Field(description="The field by which results are told apart.")] = None
 
 
 class MapIn(SettingsIn):
@@ -199,6 +207,24 @@ class PeriodOut(BaseModel):
     left_out: int = Field(description="Readings of which nobody knows with which corrections they were cut.")
 
 
+class ResultOut(BaseModel):
+    """Result of one stratum: mean and spread of its readings within R37, mm, and its parts outside today's tolerance."""
+
+    mean: float | None
+    spread: float | None = Field(description="Standard deviation of the sample.")
+    outside: int
+
+
+class ReplayedStratumOut(BaseModel):
+    """One order, nest, operator …: as it was, and as it would have been. The loop is replayed with all readings."""
+
+    name: str
+    readings: int
+    truly: ResultOut
+    today: ResultOut
+    other: ResultOut
+
+
 class WhatIfOut(PeriodOut):
     """Side by side: what was, today's settings and the others, both replayed."""
 
@@ -211,11 +237,12 @@ class WhatIfOut(PeriodOut):
     other: ReplayOut
     measured_effect: EffectOut
     cautions: list[str]
+    strata: list[ReplayedStratumOut] | None = Field(None, description="With `by`: its newest values, at most 12.")
 
     @classmethod
-    def of(cls, answer: Simulation) -> "WhatIfOut":
+    def of(cls, answer: Simulation, strata: list[ReplayedStratum] | None = None) -> "WhatIfOut":
         """As it is answered."""
-        return cls.model_validate(evidence_of(answer))
+        return cls.model_validate(evidence_of(answer) | {"strata": strata}, from_attributes=True)
 
 
 class SampledRowOut(BaseModel):

@@ -48,6 +48,7 @@ class Feature:
     more: dict[str, Any] = field(default_factory=dict)  # parameters beyond these
     plan: dict[str, Any] = field(default_factory=dict)  # how often it is measured
     expansion: dict[str, float] = field(default_factory=dict)  # of the part; its readings then carry its temperature
+    by_nest: tuple[float, ...] = ()  # how far it lies off in each nest of the fixture
     skipped: tuple[int, int] = (0, 0)  # from this live part on until before that one the probe is switched off
 
     @property
@@ -102,6 +103,15 @@ class Machine:
     first_chip: tuple[int, int]  # after this many live parts the edge of this tool chips: something to see early
     signal_path: str = "direct"  # of the probe
     type: str = "other"
+    nests: int = 0  # of its fixture, loaded in turn; 0: its readings say nothing of order and nest
+    order: int = 120  # parts
+
+    def context_of(self, feature: Feature, serial: int, temperature: float) -> dict[str, Any] | None:
+        """The context of a reading: order and nest of its part, and its temperature, if its readings say them."""
+        context: dict[str, Any] = {"part_temperature": temperature} if feature.expansion else {}
+        if self.nests:
+            context |= {"order": f"A-{4711 + serial // self.order}", "nest": 1 + serial % self.nests}
+        return context or None
 
 
 LATHE_1 = Machine(
@@ -184,7 +194,7 @@ MILL_1 = Machine(
     features=(
         Feature(
             "plate-p48", "Pocket 48 H8", 11, MILLING_INSIDE, 48.0, 0.039, 0.0, factor=0.5,
-            average_memory=11, zero_range=0.003, scatter=0.002, warmth=-0.010,
+            average_memory=11, zero_range=0.003, scatter=0.002, warmth=-0.010, by_nest=(0.0, 0.003),
             more={"axis": "Y", "feature": "inside"},
         ),
         Feature(
@@ -201,6 +211,7 @@ MILL_1 = Machine(
         ),
     ),
     first_chip=(110, 11),
+    nests=2,
 )  # fmt: skip
 # The lathe line without an operator (domain §6): a bore at three sections, accepted by two of three, corrected by their mean.
 LATHE_3 = Machine(

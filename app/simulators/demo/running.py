@@ -226,7 +226,7 @@ class Line:
             part=f"{self._run}-{probe.part.serial:04d}",
             key=f"{self._run}:{self.key}:{probe.part.serial}:{probe.feature.key}",
             correction_in_effect=probe.part.in_effect[probe.feature.key],
-            context={"part_temperature": probe.part.temperature} if probe.feature.expansion else None,
+            context=self.machine.spec.context_of(probe.feature, probe.part.serial, probe.part.temperature),
         )
 
     def _fetch_corrections(self) -> None:

@@ -2,7 +2,7 @@
 
 The size of a feature when it is cut::
 
-    size = target + bias + wears * recession(parts, chip) + warmth * theta + gain * offset + scatter
+    size = target + bias + wears * recession(parts, chip) + warmth * theta + gain * offset + nest + scatter
 
 `recession` grows quickly while a fresh edge runs in, then in proportion to the parts, and twice as fast near the end of its life; a
 chip adds to it at once. `theta`
@@ -124,6 +124,7 @@ class Machine:
                 + feature.effect.wears * edge.recession
                 + feature.warmth * self.theta
                 + feature.effect.gain * edge.offset
+                + (feature.by_nest[self.serial % len(feature.by_nest)] if feature.by_nest else 0.0)
                 + self._cutting.gauss(0.0, feature.scatter)
             )
         in_effect = {feature.key: self.edges[feature.tool].in_effect for feature in self.spec.features}

@@ -1,11 +1,12 @@
 """Page: the capability of a characteristic."""
 
-from typing import Annotated, Any
+from typing import Annotated, Any, Literal
 from urllib.parse import urlencode
 
 from fastapi import APIRouter, Query, Request, Response
 
 from app.access.deps import AnyCaller, require
+from app.core.context import Chosen, ContextField
 from app.core.natural import NaturalLimit
 from app.core.period import ALWAYS
 from app.core.spc.refusal import Refused
@@ -14,9 +15,10 @@ from app.files.formats import cell_values, periods
 from app.language.i18n import _
 from app.language.times import plant_zone
 from app.loop.characteristics import queries as characteristics
+from app.loop.readings.wording import field_word
 from app.loop.summaries import queries as summaries
 from app.loop.summaries import wording as statistics
-from app.quality.capability import fit_wording, machine_wording, wording
+from app.quality.capability import fit_wording, machine_wording, strata, wording
 from app.quality.capability.kinds import SigmaBy
 from app.quality.capability.machine_queries import newest_run
 from app.quality.capability.pictures import interval
@@ -26,7 +28,7 @@ from app.quality.gauge_studies import queries as gauges
 from app.quality.gauge_studies import wording as gauge_wording
 from app.quality.proof import queries as proof
 from app.quality.proof import wording as proof_wording
-from app.web.choice import in_address
+from app.web.choice import InContext, context_in_address, in_address
 from app.web.deps import FROM_REPLICA, SessionDep
 from app.web.forms import by_field
 from app.web.templates import page
@@ -36,7 +38,7 @@ RUNS = ("125", "500", "1000", "5000", "all")
 
 
 def _typed(
-    given: dict[str, str], last: str | None, side: Side, confidence: float, sigma_by: SigmaBy
+    given: dict[str, str], last: str | None, side: Side, confidence: float, sigma_by: SigmaBy, context: Chosen
 ) -> tuple[StudyRequest, dict[str, str]]:
     """Read the typed window, with errors by field; if there are any, the last readings. Moments are of the plant's time zone, unless another is named."""
     errors: dict[str, str] = {}
@@ -49,7 +51,9 @@ def _typed(
         period = periods.period_of(given, zone)
     except Invalid as error:
         errors |= by_field(error)
-    return StudyRequest(last, ALWAYS if errors else period, side, confidence, sigma_by=sigma_by), errors
+    return StudyRequest(
+        last, ALWAYS if errors else period, side, confidence, sigma_by=sigma_by, context=context
+    ), errors
 
 
 Typed = Annotated[str, Query(max_length=64)]
@@ -61,6 +65,7 @@ def capability_page(
     session: SessionDep,
     caller: AnyCaller,
     characteristic: str,
+    context: InContext,
     start: Annotated[str, Query(alias="from", max_length=64)] = "",
     end: Annotated[str, Query(alias="to", max_length=64)] = "",
     timezone: Typed = "",
@@ -68,23 +73,25 @@ def capability_page(
     side: OneSide = "both",
     confidence: Confidence = CONFIDENCE,
     sigma_by: OfSigma = SigmaBy.NEIGHBOURS,
+    by: Annotated[ContextField | Literal[""], Query()] = "",
 ) -> Response:
     """Indices with intervals and what they are worth, spread and shape, behaviour in time, the tool without corrections."""
     typed = {"from": start, "to": end, "timezone": timezone}
-    choice, errors = _typed(typed, last, side, confidence, sigma_by)
+    choice, errors = _typed(typed, last, side, confidence, sigma_by, context)
     current = characteristics.characteristic_named(session, characteristic)
     study = study_of(session, current, choice)
     path = f"/characteristics/{current.characteristic.key}/capability"
-    now = _query(choice)
-    kept = {name: value for name, value in now.items() if name in {"side", "confidence", "sigma_by"}}
+    now = _query(choice) | ({"by": by.value} if by else {})
+    ranged = {"last", "from", "to"}
+    kept = {name: value for name, value in now.items() if name not in ranged}
 
     def link(**changes: Any) -> str:
-        unchanged = now if not changes.keys() & {"last", "from"} else kept
+        unchanged = kept if changes.keys() & ranged else now
         return f"{path}?{urlencode({name: value for name, value in (unchanged | changes).items() if value})}"
 
     def figure(picture: str) -> str:
         address = f"/api/v1/characteristics/{current.characteristic.key}/figures/capability"
-        return f"{address}?{urlencode(now | {'picture': picture})}"
+        return f"{address}?{urlencode(_query(choice) | {'picture': picture})}"
 
     timed = choice.period.bounded
     failing = proof.failing()
@@ -100,6 +107,13 @@ def capability_page(
         parameters=current.parameters,
         choice=choice,
         kept=kept,
+        of_context=statistics.context_form(
+            summaries.offered(session, current.characteristic), choice.context, by or None
+        ),
+        kept_range={name: value for name, value in now.items() if name != "by" and not name.startswith("context.")},
+        strata=strata.strata_of(session, study, by) if by else None,
+        strata_words=strata,
+        field_word=field_word,
         link=link,
         tool_since=summaries.tool_since(session, current.characteristic),
         runs=[
@@ -143,6 +157,7 @@ def _query(choice: StudyRequest) -> dict[str, str]:
     named = {
         "last": choice.last,
         **in_address(choice.period),
+        **context_in_address(choice.context),
         "side": None if choice.side == "both" else choice.side,
         "sigma_by": None if choice.sigma_by is SigmaBy.NEIGHBOURS else choice.sigma_by.value,
         "confidence": None if choice.confidence == 0.95 else f"{choice.confidence:g}",

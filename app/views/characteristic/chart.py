@@ -5,11 +5,14 @@ index, however many there are.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
+import numpy as np
 from sqlalchemy.orm import Session
 
+from app import charts
+from app.core.context import Chosen, ContextField
 from app.core.decision.limits import Zone, classify
 from app.core.temperature import AtReference, at_reference
 from app.language.i18n import _
@@ -17,8 +20,10 @@ from app.language.numbers import grouped
 from app.loop.characteristics.queries import CurrentCharacteristic, parameters_of
 from app.loop.expansion.queries import expansion_of, temperatures_between
 from app.loop.readings import queries as readings
+from app.loop.readings.wording import field_word
 from app.loop.summaries import queries as statistics
 from app.loop.summaries.queries import ChartData, ChartReading, Window
+from app.loop.summaries.wording import context_words
 from app.loop.tables.tools import AverageMemory
 from app.loop.timeline import queries as timeline
 from app.loop.timeline.figures import Event
@@ -64,6 +69,9 @@ def chart_of(session: Session, current: CurrentCharacteristic, window: Window) -
     changes = changes_of(session, current, course, window)
     before = total_before(session, current, window, changes) if window.count else 0.0
     steps, hands = steps_of(session, current, window, changes), _hands(session, current, window)
+    if window.context:
+        shown = {reading.sequence for reading in course.readings}
+        hands = [hand for hand in hands if hand.sequence in shown]
     return Chart(
         blocks=_blocks(key, course, with_average=has_memory),
         points=[
@@ -158,6 +166,33 @@ def _blocks(key: str, course: ChartData, *, with_average: bool = False) -> list[
         )
         for block, mean in zip(course.blocks, course.means, strict=True)
     ]
+
+
+def told_apart(
+    session: Session,
+    current: CurrentCharacteristic,
+    figure: charts.Chart,
+    meta: str,
+    sequences: Sequence[int],
+    by: ContextField,
+) -> charts.Chart:
+    """The figure with its single readings in the look of their order, nest …; blocks of many have none."""
+    ascending = np.array(sorted(sequences), np.int64)
+    strata = statistics.strata_of(session, current.characteristic, by, ascending)
+    labels = dict(zip(ascending.tolist(), strata.labels.tolist(), strict=True))
+    names = [f"{field_word(by)} {name}" for name in strata.names]
+    drawn = charts.told_apart(figure, meta, [labels[sequence] for sequence in sequences], names)
+    return drawn if sequences else said(drawn, _("too many readings to tell them apart"))
+
+
+def said(figure: charts.Chart, *words: str) -> charts.Chart:
+    """The figure with these words after the title of its axis."""
+    return replace(figure, x=replace(figure.x, title=" · ".join([figure.x.title, *words])))
+
+
+def only(figure: charts.Chart, context: Chosen) -> charts.Chart:
+    """The figure with the context that its readings have, if one was chosen."""
+    return said(figure, _("only {context}").format(context=context_words(context))) if context else figure
 
 
 class Run(NamedTuple):

@@ -7,6 +7,7 @@ from typing import Any, NamedTuple
 from sqlalchemy import select
 from sqlalchemy.orm import Session
 
+from app.core.context import Chosen
 from app.core.decision.limits import within_tolerance
 from app.core.decision.step import Code, deviation_of
 from app.core.parameters import Parameters
@@ -16,6 +17,7 @@ from app.language.i18n import _
 from app.loop.characteristics.queries import CurrentCharacteristic
 from app.loop.readings import queries as readings
 from app.loop.readings.records import Entry
+from app.loop.summaries.queries import in_context
 from app.loop.tables.alarms import Alarm
 from app.loop.tables.characteristics import ParametersVersion
 from app.loop.tables.tools import Correction
@@ -75,12 +77,18 @@ class Decision:
 
 
 def decisions(
-    session: Session, current: CurrentCharacteristic, *, before: int | None = None, limit: int = 25
+    session: Session,
+    current: CurrentCharacteristic,
+    *,
+    before: int | None = None,
+    limit: int = 25,
+    context: Chosen = (),
 ) -> list[Decision]:
-    """The decisions before a reading's number (or the last ones), newest first."""
+    """The decisions before a reading's number (or the last ones), newest first; only on readings of a context, if one is chosen."""
     entry = readings.entry_of(session, current.characteristic.key)
     assert entry is not None
-    answers = readings.answers(session, entry, readings.latest(session, entry, before, limit))
+    of_those = [in_context(context)] if context else []
+    answers = readings.answers(session, entry, readings.latest(session, entry, before, limit, *of_those))
     return _complete(session, current, entry, answers)
 
 

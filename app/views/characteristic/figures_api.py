@@ -5,6 +5,7 @@ from typing import Annotated, Literal
 from fastapi import Query, Response
 
 from app.access.deps import AnyCaller
+from app.core.context import ContextField
 from app.core.variants import yielded_by
 from app.loop.characteristics import queries
 from app.loop.characteristics.queries import CurrentCharacteristic
@@ -12,7 +13,7 @@ from app.loop.characteristics.wording import result_label
 from app.loop.summaries import queries as statistics
 from app.loop.summaries.queries import Window
 from app.loop.timeline import queries as timeline
-from app.views.characteristic.chart import at_20_of, chart_of, results_of, run_of
+from app.views.characteristic.chart import at_20_of, chart_of, only, results_of, run_of, told_apart
 from app.views.characteristic.figures import counting_edges, histogram_figure, result_figure, run_figure, zone_chart
 from app.web.api import FIGURE, CharacteristicKey, Theme, Width, api_router, chart_answer, problems
 from app.web.choice import Choice, Chosen
@@ -22,6 +23,12 @@ from app.web.fields import LARGEST_ID
 router = api_router("characteristics", FROM_REPLICA)
 
 ResultName = Literal["run_out", "out_of_roundness", "taper", "straightness", "repeat_range", "repeat_deviation"]
+
+
+By = Annotated[
+    ContextField | None,
+    Query(description="Tell single readings apart by this field of their context: colour, shape and legend."),
+]
 
 
 def _found(
@@ -44,6 +51,7 @@ def get_zone_chart(
     at_20: Annotated[
         bool, Query(description="With the sizes at 20 °C of single readings that have one, as a second series.")
     ] = False,
+    by: By = None,
     theme: Theme = "light",
     width: Width = 1240,
 ) -> Response:
@@ -53,24 +61,24 @@ def get_zone_chart(
     """
     current, window = _found(session, caller, characteristic, choice)
     chart = chart_of(session, current, window)
-    return chart_answer(
-        zone_chart(
-            chart.points,
-            current.parameters,
-            blocks=chart.blocks,
-            steps=chart.steps,
-            events=chart.events,
-            hands=chart.hands,
-            scale=scale,
-            sizes=chart.sizes,
-            total_before=chart.total_before,
-            width=width,
-            ringed=ringed or ("newest" if window.reaches_now else None),
-            left_out=chart.left_out,
-            at_20=at_20_of(session, current, chart.points) if at_20 else None,
-        ),
-        theme,
+    figure = zone_chart(
+        chart.points,
+        current.parameters,
+        blocks=chart.blocks,
+        steps=chart.steps,
+        events=chart.events,
+        hands=chart.hands,
+        scale=scale,
+        sizes=chart.sizes,
+        total_before=chart.total_before,
+        width=width,
+        ringed=ringed or ("newest" if window.reaches_now else None),
+        left_out=chart.left_out,
+        at_20=at_20_of(session, current, chart.points) if at_20 else None,
     )
+    if by is not None:
+        figure = told_apart(session, current, figure, "readings", [point.sequence for point in chart.points], by)
+    return chart_answer(only(figure, window.context), theme)
 
 
 @router.get("/characteristics/{characteristic}/figures/run", responses=problems(404) | FIGURE, response_model=None)
@@ -79,6 +87,7 @@ def get_run_chart(
     caller: AnyCaller,
     characteristic: CharacteristicKey,
     choice: Chosen,
+    by: By = None,
     theme: Theme = "light",
     width: Width = 1240,
 ) -> Response:
@@ -89,8 +98,10 @@ def get_run_chart(
     current, window = _found(session, caller, characteristic, choice)
     run = run_of(session, current, window)
     figure = run_figure(run.points, current.parameters, sizes=run.sizes, blocks=run.blocks)
+    if by is not None:
+        figure = told_apart(session, current, figure, "run", [point.sequence for point in run.points], by)
     over = window.first, window.last
-    return chart_answer(timeline.with_events(session, current, figure, width, over=over), theme)
+    return chart_answer(timeline.with_events(session, current, only(figure, window.context), width, over=over), theme)
 
 
 @router.get("/characteristics/{characteristic}/figures/results", responses=problems(404) | FIGURE, response_model=None)

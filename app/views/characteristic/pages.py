@@ -15,6 +15,7 @@ from sqlalchemy.orm import Session
 from starlette.responses import RedirectResponse
 
 from app.access.deps import Caller, Operator, Viewer
+from app.core.context import ContextField
 from app.core.parameters import BY_NAME
 from app.core.probing import start_and_end
 from app.core.variants import yielded_by
@@ -22,7 +23,6 @@ from app.errors import InbandError
 from app.files.documents.content import Fact
 from app.jobs.queries import failures_of
 from app.jobs.wording import with_job_words
-from app.language.i18n import _
 from app.loop.alarm_response.wording import action_word
 from app.loop.calibration import queries as calibrations
 from app.loop.characteristics import queries
@@ -48,7 +48,7 @@ from app.views.characteristic.decisions import Decision, decision, decisions, ve
 from app.views.characteristic.figures import angle_of, residuals_of, touches_picture
 from app.views.characteristic.figures_api import ResultName
 from app.views.characteristic.glance import band_picture
-from app.views.characteristic.wording import next_action, reading_link, state_word
+from app.views.characteristic.wording import code_word, next_action, reading_link, state_word
 from app.web.choice import Choice, ChosenOnPage
 from app.web.deps import Before, FormDep, SessionDep
 from app.web.fields import LARGEST_ID, Reason
@@ -120,7 +120,8 @@ class CharacteristicView:
 
     @cached_property
     def decisions(self) -> list[Decision]:
-        return decisions(self._session, self.current, before=self._before, limit=DECISIONS_ON_PAGE + 1)
+        of = self._choice.context
+        return decisions(self._session, self.current, before=self._before, limit=DECISIONS_ON_PAGE + 1, context=of)
 
     @cached_property
     def plan(self) -> Look | None:
@@ -154,6 +155,7 @@ def characteristic_page(
     before: Before = None,
     edge: Annotated[Literal["tool", "1000", "all"], Query()] = "tool",
     result: Annotated[ResultName | None, Query()] = None,
+    by: Annotated[ContextField | Literal[""], Query()] = "",
     x_live_part: Annotated[str | None, Header()] = None,
 ) -> Response:
     """The zone chart, the numbers, the decisions and the parameters of one characteristic."""
@@ -163,7 +165,8 @@ def characteristic_page(
 
     def link(**changes: Any) -> str:
         """This page with something else chosen."""
-        unchanged = (chosen if not changes.keys() & {"last", "first", "from"} else {}) | {
+        unchanged = (chosen if not changes.keys() & {"last", "first", "from"} else choice.of_context) | {
+            "by": by or None,
             "scale": scale,
             "edge": edge,
             "result": result,
@@ -175,7 +178,8 @@ def characteristic_page(
     yielded = yielded_by(current.parameters)
     drawn_result = result if result in yielded else next(iter(yielded), None)
     figure = "run" if scale == "time" else "zones"
-    chart_query = chosen if scale == "time" else chosen | {"scale": scale}
+    chart_query = chosen | ({} if scale == "time" else {"scale": scale}) | ({"by": by} if by else {})
+    offered = statistics.offered(session, current.characteristic) if x_live_part is None else {}
     return page(
         request,
         "characteristics/characteristic.html",
@@ -194,6 +198,7 @@ def characteristic_page(
         in_force=current.version,
         table=parameter_table(current.version.parameters),
         choice=choice,
+        of_context=statistics_wording.context_form(offered, choice.context, by or None),
         tool_since=statistics.tool_since(session, current.characteristic) if x_live_part is None else None,
         scale=scale,
         result=result,
@@ -337,13 +342,3 @@ def _reading(
         code_word=code_word,
         action_word=action_word,
     )
-
-
-def code_word(action: str) -> str:
-    """Decision in a few words."""
-    return {
-        "none": _("No correction"),
-        "correct": _("Corrected"),
-        "hold": _("Correction held"),
-        "stop": _("Stop asked for"),
-    }.get(action, action)

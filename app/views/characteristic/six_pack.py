@@ -58,7 +58,7 @@ def six_pack_page(request: Request, session: SessionDep, characteristic: str, ch
     path = f"/characteristics/{current.characteristic.key}"
     asked = choice.query if request.query_params.keys() & {"last", "from", "to"} else {"last": str(USUAL)}
     last = None if choice.period.bounded else str(asked.get("last", "all"))
-    study = study_of(session, current, StudyRequest(last, choice.period, "both", 0.95))
+    study = study_of(session, current, StudyRequest(last, choice.period, "both", 0.95, context=choice.context))
     baseline = controls.baseline_in_force(session, current.characteristic)
     failing = proof.failing()
 

@@ -62,3 +62,13 @@ _ACTIONS = {
 def reading_link(key: str, sequence: int) -> str:
     """Address of the page of a reading."""
     return f"/characteristics/{key}/readings/{sequence}"
+
+
+def code_word(action: str) -> str:
+    """Decision in a few words."""
+    return {
+        "none": _("No correction"),
+        "correct": _("Corrected"),
+        "hold": _("Correction held"),
+        "stop": _("Stop asked for"),
+    }.get(action, action)

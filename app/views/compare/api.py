@@ -23,7 +23,12 @@ Tools = Annotated[
         description="By tool: those that were changed in at these moments (the first: 1900-01-01T00:00:00Z); the last four if left out.",
     ),
 ]
-ByQuery = Annotated[SeriesBy, Query(description="What differs: characteristics, or versions, tools, periods of each.")]
+ByQuery = Annotated[
+    SeriesBy,
+    Query(
+        description="What differs: characteristics, or versions, tools, periods of each, or orders, nests … that their context says."
+    ),
+]
 
 
 @router.get("/compare/figure", responses=problems(404) | FIGURE, response_model=None, dependencies=[require("viewer")])

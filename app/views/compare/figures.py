@@ -7,7 +7,6 @@ from datetime import datetime
 from app.charts import (
     Axis,
     Chart,
-    Colour,
     Dots,
     Faded,
     Mark,
@@ -20,6 +19,7 @@ from app.charts import (
     Share,
     band,
     empty,
+    look,
     nothing,
     time_axis,
 )
@@ -27,14 +27,6 @@ from app.core.natural import NaturalLimit, Tolerance, tolerance_about_target
 from app.language.i18n import _
 from app.language.numbers import tolerance_um, um
 
-LOOKS: tuple[tuple[Colour, str], ...] = (
-    ("steady", "circle"),
-    ("correction", "square"),
-    ("wear", "diamond"),
-    ("attention", "triangle-up"),
-    ("mended", "cross"),
-    ("ink", "star"),
-)
 ROOM = Room(84, 72)  # at the right for the tolerance
 BETWEEN = 0.05  # of the height, above each panel, for its name
 
@@ -126,7 +118,7 @@ def _tolerance(course: Course, of_tolerance: bool, words: str) -> list[Mark]:
 
 
 def _marks(course: Course, number: int, of_tolerance: bool, *, named: bool) -> list[Mark]:
-    colour, symbol = LOOKS[number % len(LOOKS)]
+    colour, symbol = look(number)
     mean, low, high = (
         [None if value is None else _value(value, course, of_tolerance) for value in values]
         for values in (course.mean, course.low, course.high)

@@ -7,9 +7,12 @@ from typing import Annotated
 from fastapi import APIRouter, Query, Request, Response
 
 from app.access.deps import require
+from app.core.context import ContextField
 from app.errors import InbandError
 from app.language.i18n import _
 from app.loop.characteristics import queries as characteristics
+from app.loop.readings.wording import field_word
+from app.loop.summaries.wording import context_words
 from app.quality.capability import wording as capability
 from app.views.compare.chart import row_of
 from app.views.compare.series import MOST, Compared, SeriesBy, compared, tools_of
@@ -54,7 +57,7 @@ def compare_page(
     def link(**changes: object) -> str:
         """This page with something else chosen; None takes a choice away."""
         moved = {"last", "from", "to", "first", "through"} & set(changes)
-        kept = {} if moved else period
+        kept = choice.of_context if moved else period
         return _address("/compare", keys, {**said, **kept, **changes})
 
     return page(
@@ -71,10 +74,13 @@ def compare_page(
             (SeriesBy.VERSION.value, _("Versions of the parameters")),
             (SeriesBy.TOOL.value, _("Tools")),
             (SeriesBy.PERIOD.value, _("This period and the one before")),
+            *((field.value, field_word(field)) for field in ContextField),
         ],
         how=how,
-        kept={**said, "of": keys},
+        kept={**said, "of": keys, **choice.of_context},
         choice=choice,
+        only=context_words(choice.context),
+        everywhere=_address("/compare", keys, {**said, **choice.of_range}),
         chart_url=_address("/api/v1/compare/figure", keys, {**said, **period}),
         link=link,
         known=characteristics.characteristics(session, limit=100_000),

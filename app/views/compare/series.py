@@ -1,6 +1,7 @@
 """The series that are compared: a characteristic and a run of its readings each. Never writes."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 from datetime import UTC, datetime
 from enum import StrEnum
 from typing import NamedTuple
@@ -8,6 +9,7 @@ from typing import NamedTuple
 from sqlalchemy import ColumnElement, select
 from sqlalchemy.orm import Session
 
+from app.core.context import ContextField
 from app.core.period import Period
 from app.errors import Invalid
 from app.language.i18n import _
@@ -15,13 +17,15 @@ from app.language.numbers import as_read
 from app.language.times import local
 from app.loop.characteristics import queries as characteristics
 from app.loop.characteristics.queries import CurrentCharacteristic
+from app.loop.readings.wording import field_word
 from app.loop.summaries import queries as statistics
 from app.loop.summaries.queries import Window
 from app.loop.tables.characteristics import ParametersVersion
 from app.loop.tables.readings import Reading
 from app.loop.tools.lives_queries import Life, lives
-from app.web.choice import Choice
+from app.web.choice import Choice, context_in_address
 from app.web.fields import HISTORY_BEGINS
+from app.web.paging import address
 
 MOST = 12  # series on a page
 MOST_EACH = 4  # versions or tools of one characteristic
@@ -34,6 +38,19 @@ class SeriesBy(StrEnum):
     VERSION = "version"
     TOOL = "tool"
     PERIOD = "period"
+    ORDER = "order"  # and what else the context of a reading says
+    BATCH = "batch"
+    NEST = "nest"
+    SPINDLE = "spindle"
+    FIXTURE = "fixture"
+    OPERATOR = "operator"
+    PROGRAM = "program"
+    GAUGE = "gauge"
+
+    @property
+    def field(self) -> ContextField | None:
+        """The field of the context that differs, if one does."""
+        return ContextField(self.value) if self.value in set(ContextField) else None
 
 
 class Compared(NamedTuple):
@@ -43,6 +60,12 @@ class Compared(NamedTuple):
     current: CurrentCharacteristic
     window: Window
     began_at: datetime | None = None
+
+    @property
+    def href(self) -> str:
+        """The page of these readings."""
+        of = {"first": self.window.first, "through": self.window.last, **context_in_address(self.window.context)}
+        return address(f"/characteristics/{self.current.characteristic.key}", **of)
 
 
 def compared(
@@ -57,6 +80,9 @@ def compared(
         current = characteristics.characteristic_named(session, key)
         if by is SeriesBy.TOOL:
             found += _by_tool(session, current, tools)
+            continue
+        if by.field is not None:
+            found += _by_context(session, current, choice, by.field, MOST_EACH if len(set(keys)) > 1 else MOST)
             continue
         found += {
             SeriesBy.CHARACTERISTIC: _alone,
@@ -150,6 +176,25 @@ def _life(life: Life) -> str:
     return _("tool of {since}").format(since=as_read(life.began_at, "minutes"))
 
 
+def _by_context(
+    session: Session, current: CurrentCharacteristic, choice: Choice, field: ContextField, most: int
+) -> list[Compared]:
+    """The newest orders, nests … among the chosen readings, each with its own of these, the older ones first."""
+    window = statistics.window_of(session, current.characteristic, **choice._asdict())
+    readings = statistics.history_of(session, current.characteristic, window, ())["sequence"]
+    strata = statistics.strata_of(session, current.characteristic, field, readings)
+    found = []
+    for number, name in enumerate(strata.names[:most]):
+        of = readings[strata.labels == number]
+        context = (*(each for each in choice.context if each[0] is not field), (field, name))
+        words = f"{current.characteristic.name}, {field_word(field).lower()} {name}"
+        span = replace(window, first=int(of[0]), last=int(of[-1]), context=context)
+        found.append(Compared(words, current, span))
+    if field is ContextField.NEST:
+        return sorted(found, key=lambda each: int(dict(each.window.context)[field]))
+    return found[::-1]
+
+
 def begin_before(start: datetime, end: datetime) -> datetime:
     """The beginning of the period before; by the clock of the plant, so that before a day lies a day when the clocks change."""
     try:
@@ -164,9 +209,17 @@ def _by_period(session: Session, current: CurrentCharacteristic, choice: Choice)
     start = choice.period.start
     if start is not None:
         begin = begin_before(start, choice.period.end or datetime.now(UTC))
-        before = statistics.window_of(session, current.characteristic, period=Period(begin, start))
+        before = statistics.window_of(
+            session, current.characteristic, period=Period(begin, start), context=choice.context
+        )
     else:
         through = now.first - 1
-        before = Window(max(1, through - now.count + 1), through, now.newest)
+        before = (
+            statistics.window_of(
+                session, current.characteristic, last=choice.last, through=through, context=choice.context
+            )
+            if choice.context
+            else Window(max(1, through - now.count + 1), through, now.newest)
+        )
     name = current.characteristic.name
     return [Compared(_("{name}, before").format(name=name), current, before), Compared(name, current, now)]

@@ -28,7 +28,7 @@ def groups() -> list[Group]:
         ),
         (
             _("Judge a process"),
-            "move-in-a-chart capability control-charts run-rules shadow-trial what-if ledger read-the-wear-curve temperature gauge-studies reports",
+            "move-in-a-chart capability context control-charts run-rules shadow-trial what-if ledger read-the-wear-curve temperature gauge-studies reports",
         ),
         (_("Probe and align"), "calibrate work-zero alignment form rotary-axes"),
         (

@@ -14,6 +14,7 @@ from typing import Any, Literal, NamedTuple
 from sqlalchemy import ColumnElement, Select, func, select, tuple_
 from sqlalchemy.orm import Session
 
+from app.core.context import Chosen
 from app.core.decision.limits import Zone
 from app.core.decision.step import Action
 from app.core.period import ALWAYS, Period
@@ -23,7 +24,7 @@ from app.language.i18n import _
 from app.loop.characteristics.queries import characteristic_named
 from app.loop.readings import queries as readings
 from app.loop.readings.records import Entry, Record
-from app.loop.summaries.queries import window_of
+from app.loop.summaries.queries import in_context, window_of
 from app.loop.tables.readings import Reading, Stream
 from app.web.fields import EARLIEST, LARGEST_ID, LARGEST_SERIAL
 
@@ -44,6 +45,7 @@ class Filters(NamedTuple):
     period: Period = ALWAYS
     zones: Sequence[Zone] = ()
     actions: Sequence[Action] = ()
+    context: Chosen = ()
 
     @property
     def conditions(self) -> list[ColumnElement[bool]]:
@@ -57,6 +59,8 @@ class Filters(NamedTuple):
             conditions.append(Reading.zone.in_(self.zones))
         if self.actions:
             conditions.append(Reading.action.in_(self.actions))
+        if self.context:
+            conditions.append(in_context(self.context))
         return conditions
 
 
@@ -99,15 +103,15 @@ def _numbers(cursor: str, count: int) -> list[int]:
 
 
 def _of_one(session: Session, entry: Entry, filters: Filters, order: Order, at: int | None) -> Select[Any]:
-    """By number; a period is narrowed to a run of numbers first."""
+    """By number; a period or a context is narrowed to a run of numbers first."""
     conditions = [
         Reading.machine_id == entry.machine_id,
         Reading.characteristic_id == entry.characteristic_id,
         *filters.conditions,
     ]
-    if filters.period.bounded:
+    if filters.period.bounded or filters.context:
         characteristic = characteristic_named(session, entry.characteristic).characteristic
-        window = window_of(session, characteristic, period=filters.period)
+        window = window_of(session, characteristic, period=filters.period, context=filters.context)
         conditions.append(Reading.sequence.between(window.first, window.last))
     if at is not None:
         conditions.append(Reading.sequence > at if order == "oldest" else Reading.sequence < at)

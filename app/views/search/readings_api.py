@@ -13,7 +13,7 @@ from app.loop.readings.queries import entry_for
 from app.views.search import readings
 from app.views.search.parts import Part
 from app.web.api import Limit, MachineFilter, api_router, problems
-from app.web.choice import InPeriod
+from app.web.choice import InContext, InPeriod
 from app.web.deps import FROM_REPLICA, SessionDep
 from app.web.fields import Page
 
@@ -26,6 +26,7 @@ def list_readings(
     session: SessionDep,
     caller: AnyCaller,
     period: InPeriod,
+    context: InContext,
     characteristic: Annotated[
         str | None, Query(description="Only of the characteristic with this key.", examples=["shaft-d40"])
     ] = None,
@@ -46,7 +47,7 @@ def list_readings(
     limit: Limit = 100,
 ) -> Page[ReadingRow]:
     """Readings in the order of their arrival, those of one batch by characteristic: of a characteristic, a machine, a part, a
-    period, or several of these at once.
+    period, an order or another value of their context, or several of these at once.
 
     The key of a machine sees those of that machine. What is rare in millions of readings is found faster within a period.
     """
@@ -54,7 +55,7 @@ def list_readings(
     machine_id = only_machine(session, caller, machine)
     if entry is not None and machine_id not in (None, entry.machine_id):
         return Page(items=[])
-    filters = readings.Filters(entry, machine_id, part, period, zone, action)
+    filters = readings.Filters(entry, machine_id, part, period, zone, action, context)
     records = readings.found(session, filters, order, after, limit + 1)
     shown = records[:limit]
     items = [ReadingRow.model_validate(row) for row in readings.answers(session, shown)]

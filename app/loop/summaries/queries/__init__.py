@@ -5,6 +5,7 @@ readings cost little more than ten thousand, and no extreme is thinned away.
 """
 
 from app.loop.summaries.queries.chart_data import ChartData, ChartReading, chart_data_of, moments_of, single_readings
+from app.loop.summaries.queries.context import Strata, in_context, offered, strata_of
 from app.loop.summaries.queries.history import History, history_of
 from app.loop.summaries.queries.numbers import MOST_IN_HISTOGRAM, Numbers, Unworn, histogram_of, numbers_of, unworn_of
 from app.loop.summaries.queries.pyramid import Block
@@ -26,18 +27,22 @@ __all__ = [
     "History",
     "Numbers",
     "Rejects",
+    "Strata",
     "Unworn",
     "Window",
     "chart_data_of",
     "histogram_of",
     "history_of",
+    "in_context",
     "moments_of",
     "numbers_of",
+    "offered",
     "rejects_by_characteristic",
     "rejects_of",
     "results_of",
     "since_tool_change",
     "single_readings",
+    "strata_of",
     "tool_since",
     "unworn_of",
     "window_of",

@@ -5,9 +5,12 @@ from dataclasses import replace
 from datetime import datetime
 from typing import NamedTuple
 
-from sqlalchemy import select
+from sqlalchemy import select, text
 from sqlalchemy.orm import Session
 
+from app.core.decision.limits import Zone
+from app.db.period import in_period_sql
+from app.loop.summaries.queries.context import in_context_sql, written
 from app.loop.summaries.queries.pyramid import BASE_LEVEL, FAN, TOP_LEVEL, Block, Mean, Run, blocks_of, means_of
 from app.loop.summaries.queries.window import Window
 from app.loop.tables.characteristics import Characteristic
@@ -40,6 +43,20 @@ class ChartData(NamedTuple):
 
 
 _COLUMNS = [getattr(Reading, name) for name in ChartReading._fields]
+
+# Blocks of the readings of one context, as the pyramid has them of all; the last two are the mean that statistics count.
+_OF_CONTEXT = f"""
+SELECT (r.sequence - 1) >> :level, count(*), min(r.deviation), max(r.deviation), sum(r.deviation), sum(r.deviation * r.deviation),
+    (array_agg(r.average_after ORDER BY r.sequence DESC))[1], count(r.correction),
+    ARRAY[{", ".join(f"count(*) FILTER (WHERE r.zone = '{zone.value}')" for zone in Zone)}],
+    min(r.measured_at), max(r.measured_at),
+    avg(r.deviation) FILTER (WHERE counts), count(*) FILTER (WHERE NOT counts)
+FROM reading r CROSS JOIN LATERAL (
+    SELECT r.zone <> '{Zone.PROBE_FAULT.value}' AND NOT r.sequence = ANY(CAST(:excluded AS bigint[])) AS counts
+) AS judged
+WHERE r.machine_id = :machine AND r.characteristic_id = :characteristic AND r.sequence BETWEEN :first AND :last
+    AND {in_period_sql("r.measured_at")}
+"""  # noqa: S608 - made of the names of our zones
 
 
 def plan(window: Window) -> tuple[list[tuple[int, int, int]], list[Run]]:
@@ -79,6 +96,8 @@ def plan(window: Window) -> tuple[list[tuple[int, int, int]], list[Run]]:
 
 def chart_data_of(session: Session, characteristic: Characteristic, window: Window) -> ChartData:
     """Every reading of the window, in no more rows than can be drawn. A block of which a part is meant is drawn whole."""
+    if window.context and window.count > MOST_READINGS:
+        return _of_context(session, characteristic, window)
     pieces, runs = plan(window)
     blocks: list[Block] = []
     for level, low, high in pieces:
@@ -98,17 +117,44 @@ def chart_data_of(session: Session, characteristic: Characteristic, window: Wind
     return ChartData(blocks, means_of(session, characteristic, blocks), readings, frozenset(excluded))
 
 
-def readings_of(session: Session, characteristic: Characteristic, window: Window) -> list[ChartReading]:
-    """These readings, ascending."""
+def _of_context(session: Session, characteristic: Characteristic, window: Window) -> ChartData:
+    """Those of a context among very many: one by one where they are few, else blocks of them."""
+    excluded = excluded_of(session, characteristic, window.first, window.last)
+    singly = readings_of(session, characteristic, window, MOST_READINGS + 1)
+    if len(singly) <= MOST_READINGS:
+        return ChartData([], [], singly, frozenset(excluded))
+    level = next(level for level in range(TOP_LEVEL + 1) if window.count >> level <= MOST_BLOCKS)
+    rows = session.execute(
+        text(_OF_CONTEXT + in_context_sql(window.context, "r") + " GROUP BY 1 ORDER BY 1"),
+        {
+            "level": level,
+            "machine": characteristic.machine_id,
+            "characteristic": characteristic.id,
+            "first": window.first,
+            "last": window.last,
+            "excluded": list(excluded),
+            "context": written(window.context),
+            **window.period._asdict(),
+        },
+    ).all()
+    blocks = [Block(level, *row[:-2]) for row in rows]
+    return ChartData(blocks, [Mean(*row[-2:]) for row in rows], [], frozenset())
+
+
+def readings_of(
+    session: Session, characteristic: Characteristic, window: Window, most: int | None = None
+) -> list[ChartReading]:
+    """These readings, ascending; the first `most`."""
     rows = session.execute(
         select(*_COLUMNS)
         .where(
             Reading.machine_id == characteristic.machine_id,
             Reading.characteristic_id == characteristic.id,
             Reading.sequence.between(window.first, window.last),
-            window.in_time,
+            window.meant,
         )
         .order_by(Reading.sequence)
+        .limit(most)
     )
     return [ChartReading(*row) for row in rows]
 

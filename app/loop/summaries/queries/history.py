@@ -5,7 +5,7 @@ it as it is. Row by row it would be ten times as long, nearly all of it spent on
 """
 
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -17,6 +17,7 @@ from app.core.decision.step import Code
 from app.errors import Invalid
 from app.language.i18n import _
 from app.loop.summaries.queries.chart_data import excluded_of
+from app.loop.summaries.queries.context import sequences_in_context
 from app.loop.summaries.queries.window import Window
 from app.loop.tables.characteristics import Characteristic
 
@@ -88,7 +89,7 @@ def history_of(
     window: Window,
     columns: Iterable[str] = ("deviation",),
 ) -> History:
-    """The readings of the window; excluded ones are marked.
+    """The readings of the window; excluded ones are marked. Those of a context are taken out of all: a session reads these once.
 
     columns: names of `COLUMNS`; `sequence` comes in any case. Raises `Invalid` for more than ten million readings.
     """
@@ -99,8 +100,13 @@ def history_of(
             ),
             _("Choose a shorter period, or fewer readings."),
         )
-    names = [name for name in dict.fromkeys(["sequence", *columns]) if name != "sequence" or window.timed]
-    if window.timed:
+    if window.context:
+        whole = history_of(session, characteristic, replace(window, context=()), columns)
+        ends = window.first, window.last
+        meant = sequences_in_context(session, characteristic, window.context, *ends) if window.count else ()
+        return whole.only(np.isin(whole["sequence"], np.asarray(meant, np.int64)))
+    names = [name for name in dict.fromkeys(["sequence", *columns]) if name != "sequence" or window.narrowed]
+    if window.narrowed:
         values = _columns(session, characteristic, window, names)
     else:  # they are numbered without a gap
         values = _whole(session, characteristic, window, names or ["sequence"])

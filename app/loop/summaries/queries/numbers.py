@@ -15,6 +15,7 @@ from app.core.decision.limits import FAULT, Zone, nanometres, nanometres_sql, wi
 from app.core.natural import half_width
 from app.db.period import in_period_sql
 from app.loop.summaries.queries.chart_data import excluded_of
+from app.loop.summaries.queries.context import in_context_sql, written
 from app.loop.summaries.queries.pyramid import Block, Run, cover_of
 from app.loop.summaries.queries.window import Window
 from app.loop.tables.characteristics import Characteristic, ParametersVersion
@@ -48,12 +49,11 @@ FROM reading r
 WHERE machine_id = :machine AND characteristic_id = :characteristic AND sequence BETWEEN :first AND :last
   AND {_OF_A_PART} AND NOT sequence = ANY(CAST(:excluded AS bigint[]))
   AND {in_period_sql("measured_at")}
-GROUP BY bar
 """  # noqa: S608 - made of the names of our zones
 
 
 _UNWORN = f"""
-SELECT avg(deviation), stddev_samp(deviation) FROM reading
+SELECT avg(deviation), stddev_samp(deviation) FROM reading r
 WHERE machine_id = :machine AND characteristic_id = :characteristic AND sequence BETWEEN :first AND :last
   AND zone NOT IN ('{Zone.WEAR.value}', '{Zone.PROBE_FAULT.value}')
   AND NOT sequence = ANY(CAST(:excluded AS bigint[])) AND {in_period_sql("measured_at")}
@@ -61,7 +61,7 @@ WHERE machine_id = :machine AND characteristic_id = :characteristic AND sequence
 
 
 _EXCLUDED = f"""
-SELECT count(*) FROM reading WHERE machine_id = :machine AND characteristic_id = :characteristic
+SELECT count(*) FROM reading r WHERE machine_id = :machine AND characteristic_id = :characteristic
     AND sequence = ANY(CAST(:excluded AS bigint[])) AND {in_period_sql("measured_at")}
 """  # noqa: S608 - made of our own names
 
@@ -125,7 +125,7 @@ def numbers_of(session: Session, characteristic: Characteristic, window: Window)
     tolerances = _tolerances(session, characteristic)
     parts: list[_Part] = []
     runs: list[Run] = [(window.first, window.last)]
-    if window.count > MOST_ONE_BY_ONE:
+    if window.count > MOST_ONE_BY_ONE and not window.context:
         # Where even the extremes are in the tightest tolerance there ever was, no part is outside. The sums of a block
         # hold its probe faults, so one with any is looked into; they are outside as a rule, and few.
         tightest = min(tolerances.values())
@@ -144,20 +144,25 @@ def numbers_of(session: Session, characteristic: Characteristic, window: Window)
     where = {"machine": characteristic.machine_id, "characteristic": characteristic.id, "excluded": list(excluded)}
     if window.count and runs:
         row = session.execute(
-            text(_PARTS),
+            text(_PARTS + in_context_sql(window.context, "r")),
             where
             | {
                 "firsts": [first for first, _last in runs],
                 "lasts": [last for _first, last in runs],
                 "versions": list(tolerances),
                 "tolerances": list(tolerances.values()),
-                **window.period._asdict(),
+                **_meant(window),
             },
         ).one()
         measured, mean, squares, minimum, maximum, corrections, in_tolerance, *zones = row
         spread = _Spread(measured, mean, squares, minimum, maximum) if measured else None
         parts.append(_Part(spread, corrections, in_tolerance, zones))
     return _total(parts, _excluded_in_time(session, characteristic, excluded, window))
+
+
+def _meant(window: Window) -> dict[str, Any]:
+    """The values of the conditions that readings of a window meet."""
+    return {**window.period._asdict(), **({"context": written(window.context)} if window.context else {})}
 
 
 class Unworn(NamedTuple):
@@ -177,14 +182,14 @@ def unworn_of(session: Session, characteristic: Characteristic, window: Window, 
     if not worn:
         return None
     found = session.execute(
-        text(_UNWORN),
+        text(_UNWORN + in_context_sql(window.context, "r")),
         {
             "machine": characteristic.machine_id,
             "characteristic": characteristic.id,
             "first": window.first,
             "last": window.last,
             "excluded": list(excluded_of(session, characteristic, window.first, window.last)),
-            **window.period._asdict(),
+            **_meant(window),
         },
     ).one()
     return Unworn(worn, *found)
@@ -233,16 +238,16 @@ def _tolerances(session: Session, characteristic: Characteristic) -> dict[int, i
 
 
 def _excluded_in_time(session: Session, characteristic: Characteristic, excluded: Sequence[int], window: Window) -> int:
-    if not excluded or not window.timed:
+    if not excluded or not window.narrowed:
         return len(excluded)
     return int(
         session.execute(
-            text(_EXCLUDED),
+            text(_EXCLUDED + in_context_sql(window.context, "r")),
             {
                 "machine": characteristic.machine_id,
                 "characteristic": characteristic.id,
                 "excluded": list(excluded),
-                **window.period._asdict(),
+                **_meant(window),
             },
         ).scalar_one()
     )
@@ -258,7 +263,7 @@ def histogram_of(session: Session, characteristic: Characteristic, window: Windo
     if first > window.last:
         return counts
     rows: Iterable[Any] = session.execute(
-        text(_HISTOGRAM),
+        text(_HISTOGRAM + in_context_sql(window.context, "r") + " GROUP BY bar"),
         {
             "machine": characteristic.machine_id,
             "characteristic": characteristic.id,
@@ -266,7 +271,7 @@ def histogram_of(session: Session, characteristic: Characteristic, window: Windo
             "last": window.last,
             "excluded": list(excluded_of(session, characteristic, first, window.last)),
             "edges": list(edges),
-            **window.period._asdict(),
+            **_meant(window),
         },
     )
     for bar, count in rows:

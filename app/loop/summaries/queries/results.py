@@ -9,6 +9,7 @@ from sqlalchemy.orm import Session
 
 from app.db.period import in_period_sql
 from app.loop.summaries.queries.chart_data import MOST_BLOCKS, MOST_READINGS, excluded_of, single_readings
+from app.loop.summaries.queries.context import in_context_sql, written
 from app.loop.summaries.queries.window import Window
 from app.loop.tables.characteristics import Characteristic
 from app.loop.tables.readings import Reading, ReadingResults, Stream
@@ -58,12 +59,12 @@ def results_of(session: Session, characteristic: Characteristic, window: Window,
         ReadingResults.sequence.between(first, window.last),
         value.is_not(None),
     )
-    if window.timed:
+    if window.narrowed:
         measured = select(Reading.sequence).where(
             Reading.machine_id == characteristic.machine_id,
             Reading.characteristic_id == characteristic.id,
             Reading.sequence.between(first, window.last),
-            window.in_time,
+            window.meant,
         )
         here = (*here, ReadingResults.sequence.in_(measured))
     if window.last - first < MOST_READINGS:
@@ -101,7 +102,7 @@ def rejects_of(session: Session, characteristic: Characteristic, window: Window)
     """Rejected parts and sections outside among these readings, without excluded ones."""
     excluded: Sequence[int] = excluded_of(session, characteristic, window.first, window.last) if window.count else ()
     rows = session.execute(
-        text(_REJECTS),
+        text(_REJECTS + in_context_sql(window.context, "o")),
         {
             "machine": characteristic.machine_id,
             "characteristic": characteristic.id,
@@ -109,6 +110,7 @@ def rejects_of(session: Session, characteristic: Characteristic, window: Window)
             "last": window.last,
             "excluded": list(excluded),
             **window.period._asdict(),
+            **({"context": written(window.context)} if window.context else {}),
         },
     ).one()
     return Rejects(int(rows[0]), int(rows[1]))

@@ -2,12 +2,14 @@
 
 from dataclasses import dataclass, replace
 
-from sqlalchemy import ColumnElement, exists, func, select
+from sqlalchemy import ColumnElement, and_, exists, func, select
 from sqlalchemy.orm import Session
 
+from app.core.context import Chosen
 from app.core.decision.limits import Zone
 from app.core.period import ALWAYS, Period
 from app.db.period import in_period
+from app.loop.summaries.queries.context import ends_in_context, in_context
 from app.loop.summaries.queries.pyramid import Run, cover_of
 from app.loop.tables.characteristics import Characteristic
 from app.loop.tables.readings import Exclusion, Reading, Stream
@@ -21,13 +23,14 @@ class Window:
     """A run of readings, first and last included; empty if last < first. `newest` is the stream's last sequence.
 
     period: of the run only those measured in it are meant. A reading that came late lies between others of another time; so
-    anyone who counts, counts by it too.
+    anyone who counts, counts by it too. context: only those with these values in their context.
     """
 
     first: int
     last: int
     newest: int
     period: Period = ALWAYS
+    context: Chosen = ()
 
     @property
     def count(self) -> int:
@@ -38,13 +41,15 @@ class Window:
         return self.last == self.newest
 
     @property
-    def timed(self) -> bool:
-        return self.period.bounded
+    def narrowed(self) -> bool:
+        """Tell if not all of the run are meant."""
+        return self.period.bounded or bool(self.context)
 
     @property
-    def in_time(self) -> ColumnElement[bool]:
-        """Measured in the period, as a condition on `Reading`."""
-        return in_period(Reading.measured_at, self.period)
+    def meant(self) -> ColumnElement[bool]:
+        """Measured in the period and with the context, as a condition on `Reading`."""
+        measured = in_period(Reading.measured_at, self.period)
+        return and_(measured, in_context(self.context)) if self.context else measured
 
 
 def newest_of(session: Session, characteristic: Characteristic) -> int:
@@ -67,18 +72,21 @@ def window_of(
     first: int | None = None,
     through: int | None = None,
     period: Period = ALWAYS,
+    context: Chosen = (),
     usable: bool = False,
 ) -> Window:
-    """The readings first … through; of them the newest `last`; of them those measured in the period.
+    """The readings first … through; of them those with the context; of them the newest `last`; of them those measured in the period.
 
     usable: where nobody has asked for a number: neither excluded readings nor probe faults count for `last`, up to `MOST_COUNTED`, so that an index of the last
-    1000 stays one of 1000 readings when somebody excludes one.
+    1000 stays one of 1000 readings when somebody excludes one. Not so with a context.
     """
     newest = newest_of(session, characteristic)
     low, high = max(1, first or 1), min(newest, newest if through is None else through)
-    if last is not None:
+    if context:
+        low, high = ends_in_context(session, characteristic, context, low, high, last)
+    elif last is not None:
         low = max(low, _last_usable(session, characteristic, low, high, last) if usable else high - last + 1)
-    window = Window(low, high, newest)
+    window = Window(low, high, newest, context=context)
     if not period.bounded:
         return window
     window = replace(window, period=period)
@@ -120,7 +128,7 @@ def _ends_in_time(session: Session, characteristic: Characteristic, runs: list[R
             Reading.machine_id == characteristic.machine_id,
             Reading.characteristic_id == characteristic.id,
             Reading.sequence.between(low, high),
-            window.in_time,
+            window.meant,
         )
         ends += [number for number in session.execute(query).one() if number is not None]
     return ends

@@ -78,7 +78,7 @@ class Frame:
     def holds(self, sequence: InstrumentedAttribute[int] | InstrumentedAttribute[int | None]) -> ColumnElement[bool]:
         """Condition that a row belongs, by its sequence, to a reading of the period."""
         inside = sequence.between(self.window.first, self.window.last)
-        if not self.window.timed:
+        if not self.window.narrowed:
             return inside
         return (
             inside
@@ -87,7 +87,7 @@ class Frame:
                 Reading.machine_id == self.current.machine.id,
                 Reading.characteristic_id == self.current.characteristic.id,
                 Reading.sequence == sequence,
-                self.window.in_time,
+                self.window.meant,
             )
             .correlate_except(Reading)
             .exists()

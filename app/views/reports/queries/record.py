@@ -269,7 +269,7 @@ def decisions(frame: Frame) -> Section | None:
     assert entry is not None
     records = readings.latest(
         frame.session, entry, frame.window.last + 1, MOST_DECISIONS,
-        Reading.sequence >= frame.window.first, frame.window.in_time,
+        Reading.sequence >= frame.window.first, frame.window.meant,
     )  # fmt: skip
     answers = readings.answers(frame.session, entry, records)
     table = table_of(

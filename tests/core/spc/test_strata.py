@@ -1,0 +1,76 @@
+"""Strata: numbers of each, and a test that drift does not deceive."""
+
+import numpy as np
+import pytest
+
+from app.core.spc.capability import Limits, capability
+from app.core.spc.refusal import Refused
+from app.core.spc.strata import Difference, NoAnswer, differ, strata
+
+LIMITS = Limits(-8.0, 8.0, 0.0)
+
+
+def test_each_stratum_has_the_numbers_of_its_readings_alone() -> None:
+    rng = np.random.default_rng(1)
+    values, labels = rng.normal(0, 1, 300), rng.integers(-1, 3, 300)
+    labels[:5] = 2
+    found = strata(values, labels, ["A", "B", "C", "nothing"], LIMITS, 0.95)
+    assert [each.name for each in found] == ["A", "B", "C"]
+    for at, each in enumerate(found):
+        of = values[labels == at]
+        assert (each.readings, each.mean, each.sigma) == (len(of), of.mean(), of.std(ddof=1))
+        assert each.ppk == capability(of, LIMITS).ppk
+
+
+def test_few_readings_have_a_mean_and_no_index() -> None:
+    (one,) = strata(np.array([1.0]), np.array([0]), ["A"], LIMITS, 0.95)
+    assert (one.mean, one.sigma) == (1.0, None)
+    assert isinstance(one.ppk, Refused)
+
+
+@pytest.mark.parametrize("drift", [0.0, 0.02], ids=["steady", "a tool that wears by two sigma in a hundred parts"])
+def test_where_strata_do_not_differ_one_test_in_a_hundred_says_so(drift: float) -> None:
+    rng, tests = np.random.default_rng(7), 600
+    alarms = 0
+    for _test in range(tests):
+        values = rng.normal(0, 1, 120) + drift * (np.arange(120) % 100)
+        found = differ(values, rng.integers(0, 3, 120))
+        assert isinstance(found, Difference)
+        alarms += found.test.significant
+    assert alarms <= 15, "of 600 at 1 %: 15 or more in one of a thousand such runs"
+
+
+def test_a_nest_that_is_off_is_found_under_a_drift_ten_times_as_large() -> None:
+    rng = np.random.default_rng(3)
+    nest = np.arange(400) % 4
+    values = rng.normal(0, 1, 400) + np.linspace(0, 20, 400) + 2.0 * (nest == 2)
+    found = differ(values, nest)
+    assert isinstance(found, Difference)
+    assert found.test.significant
+    assert found.apart == pytest.approx(2.0, abs=0.5)
+    assert (found.strata, found.test.freedom) == (4, 3)
+
+
+def test_orders_one_after_the_other_are_not_blamed_for_the_wear_between_them() -> None:
+    values = np.random.default_rng(5).normal(0, 1, 400) + np.linspace(0, 20, 400)
+    assert differ(values, np.arange(400) // 100) is NoAnswer.APART
+    assert differ(values, np.zeros(400, np.int64)) is NoAnswer.ONE
+    assert differ(values, np.full(400, -1)) is NoAnswer.ONE
+    assert differ(np.zeros(400), np.arange(400) % 2) is NoAnswer.NO_VARIATION
+
+
+def test_a_stratum_with_too_few_neighbours_is_left_out_of_the_test() -> None:
+    rng = np.random.default_rng(9)
+    labels = np.arange(300) % 2
+    labels[7] = 2
+    found = differ(rng.normal(0, 1, 300), labels)
+    assert isinstance(found, Difference)
+    assert found.strata == 2
+
+
+def test_groups_of_strata_that_never_met_are_tested_but_not_measured_against_each_other() -> None:
+    rng = np.random.default_rng(11)
+    labels = np.concatenate((np.arange(100) % 2, 2 + np.arange(100) % 2))
+    found = differ(rng.normal(0, 1, 200) + 5 * (labels == 3), labels)
+    assert isinstance(found, Difference)
+    assert (found.test.significant, found.test.freedom, found.apart) == (True, 2, None)

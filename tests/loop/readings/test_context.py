@@ -1,0 +1,169 @@
+"""Readings told apart by their context: filters, charts, capability, comparison and replay count what belongs to an order or a nest."""
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+from tests.conftest import Server
+from tests.shop import Person, Shop
+
+COUNT = 3_000
+
+
+class Told:
+    """A characteristic with readings of two nests in turn and three orders one after the other; nest 2 lies 3 µm higher."""
+
+    def __init__(self, server: Server) -> None:
+        self.shop = shop = Shop(server)
+        at = np.arange(COUNT)
+        self.nest = 1 + at % 2
+        self.order = [f"A-{each}" for each in at // 1000]
+        self.deviation = np.round(np.random.default_rng(2).normal(0, 0.8, COUNT) + 3 * (self.nest == 2), 3)
+        self.key = shop.another("seat", mode="measure_only")
+        context = [
+            {"nest": int(nest), "order": order, "operator": "Milica"}
+            for nest, order in zip(self.nest, self.order, strict=True)
+        ]
+        shop.push(self.deviation.tolist(), self.key, context=context)
+        shop.push([0.5, 0.25], self.key)  # of nothing known
+        self.path = f"/characteristics/{self.key}"
+
+    def get(self, path: str, **query: Any) -> Any:
+        answer = self.shop.admin.get(f"/api/v1{path}", params=query)
+        assert answer.status_code == 200, answer.text
+        return answer.json()
+
+
+@pytest.fixture(scope="module")
+def told(server: Server) -> Told:
+    return Told(server)
+
+
+@pytest.fixture(scope="module")
+def viewer(server: Server) -> Person:
+    return Person(server, "viewer")
+
+
+def traces(figure: Any, meta: str) -> list[Any]:
+    return [trace for trace in figure["data"] if trace.get("meta") == meta]
+
+
+def test_the_list_holds_those_of_an_order_and_a_nest(told: Told) -> None:
+    items = told.get("/readings", characteristic=told.key, limit=1000, **{"context.order": "A-1", "context.nest": "2"})[
+        "items"
+    ]
+    wanted = [n + 1 for n in range(COUNT) if told.order[n] == "A-1" and told.nest[n] == 2]
+    assert [item["sequence"] for item in items] == wanted
+    everywhere = told.get("/readings", machine=told.shop.machine, limit=5, **{"context.order": "A-2"})["items"]
+    assert [item["sequence"] for item in everywhere] == [2001, 2002, 2003, 2004, 2005]
+    assert told.get("/readings", characteristic=told.key, **{"context.order": "A-9"})["items"] == []
+
+
+def test_what_no_context_can_hold_is_refused(told: Told) -> None:
+    for query in ("context.order=a%00b", "context.nest=two", "context.colour=red"):
+        assert told.shop.admin.get(f"/api/v1/readings?{query}").status_code == 422, query
+
+
+def test_capability_is_that_of_the_readings_with_the_context_and_the_last_n_are_counted_among_them(told: Told) -> None:
+    found = told.get(f"{told.path}/capability", last="all", **{"context.nest": "2"})
+    mine = told.deviation[told.nest == 2] / 1000
+    assert (found["readings"], found["mean"]) == (1500, pytest.approx(mine.mean()))
+    assert found["sigma_overall"] == pytest.approx(mine.std(ddof=1))
+    assert "only Nest 2" in found["quoted"]["window"]
+    last = told.get(f"{told.path}/capability", last="100", **{"context.order": "A-0"})
+    assert (last["readings"], last["first_sequence"], last["last_sequence"]) == (100, 901, 1000)
+
+
+def test_nests_in_turn_differ_and_each_has_its_numbers(told: Told) -> None:
+    found = told.get(f"{told.path}/strata", by="nest", last="all")
+    assert [(each["name"], each["readings"]) for each in found["strata"]] == [("2", 1500), ("1", 1500)]
+    for each in found["strata"]:
+        mine = told.deviation[told.nest == int(each["name"])] / 1000
+        assert (each["mean"], each["standard_deviation"]) == (
+            pytest.approx(mine.mean()),
+            pytest.approx(mine.std(ddof=1)),
+        )
+        ppk = (0.008 - abs(mine.mean())) / 3 / mine.std(ddof=1)
+        assert each["ppk"]["low"] < each["ppk"]["value"] == pytest.approx(ppk) < each["ppk"]["high"]
+    assert found["difference"]["significant"]
+    assert found["difference"]["apart"] == pytest.approx(0.003, abs=0.0002)
+    assert (found["without"], found["older"]) == (2, 0)
+
+
+def test_of_orders_one_after_the_other_nobody_says_that_they_differ(told: Told) -> None:
+    found = told.get(f"{told.path}/strata", by="order", last="all")
+    assert [each["name"] for each in found["strata"]] == ["A-2", "A-1", "A-0"]
+    assert found["difference"] is None
+    assert "one after the other" in found["text"]
+    assert "There are no two" in told.get(f"{told.path}/strata", by="fixture")["text"]
+
+
+def test_numbers_and_spread_of_the_page_are_of_the_context(told: Told, viewer: Person) -> None:
+    figure = told.get(f"{told.path}/figures/histogram", last="all", **{"context.nest": "1"})
+    assert sum(traces(figure, "histogram")[0]["x"]) == 1500
+    page = viewer.open(f"{told.path}?last=all&context.nest=1")
+    assert "Nest 1" in page
+    assert 'name="context.order"' in page
+    assert "1500" in page
+    assert 'name="context.order"' not in viewer.open(f"/characteristics/{told.shop.characteristic}"), "none has any"
+
+
+def test_points_of_a_chart_are_told_apart(told: Told) -> None:
+    figure = told.get(f"{told.path}/figures/zones", last="50", by="nest")
+    assert [trace["name"] for trace in traces(figure, "stratum")] == ["Nest 2", "Nest 1"]
+    (readings,) = traces(figure, "readings")
+    symbols = readings["marker"]["symbol"]
+    assert len(set(symbols[:48:2])) == len(set(symbols[1:48:2])) == 1
+    assert symbols[0] != symbols[1]
+    (run,) = traces(told.get(f"{told.path}/figures/run", last="50", by="nest"), "run")
+    assert len(set(run["marker"]["symbol"][:40])) == 2
+    (points,) = traces(told.get(f"{told.path}/figures/control", last="50", by="nest"), "points")
+    assert len(set(points["marker"]["symbol"])) >= 2
+
+
+def test_a_chart_of_one_context_has_all_of_it_and_no_extreme_is_thinned_away(told: Told) -> None:
+    figure = told.get(f"{told.path}/figures/zones", last="all", **{"context.nest": "1"})
+    (readings,) = traces(figure, "readings")
+    assert len(readings["x"]) == 1500
+    assert all(number % 2 for number in readings["x"])
+    assert "only Nest 1" in str(figure["layout"])
+    thinned = told.get(f"{told.path}/figures/run", last="all", **{"context.operator": "Milica"})
+    highest = max(max(trace["y"]) for meta in ("extremes", "maximum") for trace in traces(thinned, meta))
+    assert highest == pytest.approx(40 + told.deviation.max() / 1000, abs=1e-6)
+
+
+def test_a_control_chart_shows_points_of_the_context_and_judges_them_among_all(told: Told) -> None:
+    whole = told.get(f"{told.path}/control", last="100")
+    shown = told.get(f"{told.path}/control", last="49", **{"context.nest": "2"})
+    values = dict(zip(whole["points"]["last"], whole["points"]["value"], strict=True))
+    points = zip(shown["points"]["last"], shown["points"]["value"], strict=True)
+    assert len(shown["points"]["last"]) == 49
+    assert all(not last % 2 and values[last] == value for last, value in points)
+
+
+def test_nests_are_compared_side_by_side(told: Told, viewer: Person) -> None:
+    page = viewer.open(f"/compare?of={told.key}&by=nest&last=400")
+    assert page.count("nest 1") >= 1
+    assert page.count("nest 2") >= 1
+    figure = told.get("/compare/figure", of=told.key, by="order", last="all")
+    assert len([trace for trace in figure["data"] if trace.get("meta") == "readings"]) == 3
+
+
+def test_a_replay_says_what_it_would_have_done_for_each_nest(told: Told, viewer: Person) -> None:
+    answer = told.shop.call("POST", f"{told.path}/what-if", by="nest", last=1000, weighting_factor=3)
+    found = {each["name"]: each for each in answer["strata"]}
+    mine = told.deviation[-998:]
+    nest = told.nest[-998:]
+    for name, each in found.items():
+        of = mine[nest == int(name)] / 1000
+        assert (each["readings"], each["truly"]["mean"]) == (len(of), pytest.approx(of.mean()))
+        assert each["truly"]["outside"] == int((np.abs(of) > 0.008).sum())
+    assert "replayed with all readings" in viewer.open(f"{told.path}/what-if?by=nest")
+
+
+def test_the_capability_page_has_a_table_of_strata(told: Told, viewer: Person) -> None:
+    page = viewer.open(f"{told.path}/capability?last=all&by=nest")
+    assert "They differ: side by side" in page
+    assert "context.nest=2" in page
+    assert "only Order A-1" in viewer.open(f"{told.path}/capability?last=all&context.order=A-1")
