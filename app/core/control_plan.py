@@ -17,6 +17,7 @@ from math import inf
 from typing import NamedTuple
 
 from app.core.affected import names_between
+from app.core.context import ContextField
 
 MISSED_ALARM = "measurement_missed"
 """The kind of alarm that asks for no more measurements than the plan itself."""
@@ -54,7 +55,8 @@ class Plan:
 
     every: 1 in N parts; minutes: at least once in N minutes of running; per_shift: at least once in each shift in
     which the part is made. after_change, after_alarm: every part for N readings. on_the_way: parts that lie between the
-    machine and the gauge. numbered: parts are numbered one by one, so that a number that is missing is a part.
+    machine and the gauge. numbered: parts are numbered one by one, so that a number that is missing is a part. required_context:
+    what the context of every reading must say, however often it is measured.
     """
 
     every: int | None = None
@@ -64,10 +66,11 @@ class Plan:
     after_alarm: int = 0
     on_the_way: int = 0
     numbered: bool = False
+    required_context: tuple[ContextField, ...] = ()
 
     @property
     def asks(self) -> bool:
-        """Tell if it asks for anything."""
+        """Tell if it asks for measurements."""
         return bool(self.counts_parts or self.minutes or self.per_shift)
 
     @property

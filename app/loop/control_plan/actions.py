@@ -14,7 +14,7 @@ from app.language.i18n import _
 from app.loop.alarms import actions as alarms
 from app.loop.characteristics.queries import characteristic_named
 from app.loop.control_plan import queries
-from app.loop.control_plan.alarm_kinds import MISSED
+from app.loop.control_plan.alarm_kinds import CONTEXT_MISSING, MISSED
 from app.loop.control_plan.queries import Look
 from app.loop.control_plan.schemas import ControlPlanIn
 from app.loop.machines.queries import lock_machines
@@ -42,17 +42,19 @@ def set_plan(session: Session, key: str, given: ControlPlanIn, caller: Caller) -
         setattr(row, name, value)
     row.changed_by, row.reason, row.since = caller.name, given.reason, datetime.now(UTC)
     row.seen = session.get_one(Stream, (machine.id, characteristic.id), populate_existing=True).sequence
+    row.context_seen = row.seen
     session.flush()
     state.planned = queries.any_counts_parts(session, machine.id)
     _end(session, row, machine.key, key, by=caller.name, comment=given.reason, outcome={"code": "plan_changed"})
-    changes = {name for name, value in _fields(after).items() if value != getattr(before, name)}
+    _end_context(session, row, machine.key, key, by=caller.name, comment=given.reason, outcome={"code": "plan_changed"})
+    said = _fields(before), _fields(after)
+    changes = {name for name, value in said[1].items() if value != said[0][name]}
     record(
         session,
         caller.name,
         "control plan set",
         f"characteristic/{key}",
-        {name: getattr(before, name) for name in changes},
-        {name: getattr(after, name) for name in changes},
+        *({name: fields[name] for name in changes} for fields in said),
         given.reason,
     )
     publish(session, {"kind": "characteristic", "machine": machine.key, "characteristic": key})
@@ -60,7 +62,9 @@ def set_plan(session: Session, key: str, given: ControlPlanIn, caller: Caller) -
 
 
 def _fields(plan: Plan) -> dict[str, Any]:
-    return {name: getattr(plan, name) for name in Plan.__dataclass_fields__}
+    """Its fields as they are stored."""
+    fields = {name: getattr(plan, name) for name in Plan.__dataclass_fields__}
+    return fields | {"required_context": [field.value for field in plan.required_context]}
 
 
 def keep(session: Session, machine_id: int, characteristic_id: int) -> None:
@@ -106,6 +110,47 @@ def keep(session: Session, machine_id: int, characteristic_id: int) -> None:
     )
     if late:
         publish(session, {"kind": "characteristic", "machine": machine.key, "characteristic": characteristic.key})
+
+
+def keep_context(session: Session, machine_id: int, characteristic_id: int) -> None:
+    """Look whether the newest readings say what the plan requires of their context; raise the alarm, or end it.
+
+    It ends with readings of which none lacks anything. The machine is locked only where there is an alarm.
+    """
+    row = session.get_one(ControlPlan, (machine_id, characteristic_id), populate_existing=True)
+    lacking = queries.lacking(session, row, row.context_seen)
+    if lacking.newest <= row.context_seen:
+        return
+    if lacking.fields or alarms.is_active(session, machine_id, characteristic_id, CONTEXT_MISSING):
+        lock_machines(session, [machine_id])
+        row = session.get_one(ControlPlan, (machine_id, characteristic_id), populate_existing=True)
+        lacking = queries.lacking(session, row, row.context_seen)
+    machine, characteristic = (
+        session.get_one(Machine, machine_id),
+        session.get_one(Characteristic, (machine_id, characteristic_id)),
+    )
+    if lacking.fields:
+        alarm = alarms.raise_for_characteristic(
+            session, machine_id, characteristic_id, None, CONTEXT_MISSING, lacking.as_data
+        )
+        publish(session, alarms.news(machine.key, alarm) | {"characteristic": characteristic.key})
+    else:
+        outcome = {"code": "complete", "sequence": lacking.newest}
+        _end_context(
+            session, row, machine.key, characteristic.key, by=ACTOR, comment=_("Complete again"), outcome=outcome
+        )
+    row.context_seen = lacking.newest
+
+
+def _end_context(
+    session: Session, row: ControlPlan, machine: str, characteristic: str, *, by: str, comment: str, outcome: Any
+) -> None:
+    """End the alarm about missing context; without any nothing happens."""
+    ended = alarms.settle_for_characteristic(
+        session, row.machine_id, row.characteristic_id, CONTEXT_MISSING, by, comment, outcome
+    )
+    if ended is not None:
+        publish(session, alarms.news(machine, ended) | {"characteristic": characteristic})
 
 
 def _changes_alarm(found: Look) -> bool:

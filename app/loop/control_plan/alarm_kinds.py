@@ -3,7 +3,7 @@
 from app.core.control_plan import MISSED_ALARM
 from app.language.i18n import _, ngettext
 from app.loop.alarms.kinds import AlarmKind, register
-from app.loop.control_plan.wording import asked
+from app.loop.control_plan.wording import asked, fields_words
 from app.loop.tables.alarms import Alarm
 
 
@@ -25,6 +25,34 @@ def _sentence(alarm: Alarm) -> str:
         return _("A shift in which the part was made has ended without a measurement.")
     return _("{sentence} Planned: {plan}.").format(sentence=sentence, plan=plan) if plan else sentence
 
+
+def _lacks(alarm: Alarm) -> str:
+    data = alarm.data
+    n = int(data.get("readings") or 0)
+    sentence = ngettext(
+        "{n} reading does not say what the control plan requires: {fields}. It is stored all the same.",
+        "{n} readings do not say what the control plan requires: {fields}. They are stored all the same.",
+        n,
+    )
+    return sentence.format(n=n, fields=fields_words(data.get("fields") or ()))
+
+
+CONTEXT_MISSING = register(
+    AlarmKind(
+        "context_missing",
+        word=lambda: _("Context missing"),
+        sentence=_lacks,
+        what_to_do=lambda: _(
+            "Let the machine or its bridge send it as the reading's context, or scan it on the measuring sheet. The next readings that "
+            "have all of it end this alarm."
+        ),
+        icon="no_data",
+        outcomes={
+            "complete": lambda item: _("Reading {n} has all of it.").format(n=item.get("sequence")),
+            "plan_changed": lambda _item: _("The control plan was changed."),
+        },
+    )
+)
 
 MISSED = register(
     AlarmKind(

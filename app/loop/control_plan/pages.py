@@ -9,11 +9,13 @@ from sqlalchemy.orm import Session
 from starlette.responses import RedirectResponse
 
 from app.access.deps import Caller, Engineer, Viewer
+from app.core.context import ContextField
 from app.core.control_plan import Plan
 from app.errors import Invalid
 from app.loop.characteristics.queries import characteristic_named
 from app.loop.control_plan import actions, queries, wording
 from app.loop.control_plan.schemas import ControlPlanIn
+from app.loop.readings.wording import field_word
 from app.web.deps import Before, FormDep, SessionDep, Word
 from app.web.forms import by_field, typed
 from app.web.paging import address, part_of
@@ -37,7 +39,8 @@ def set_control_plan(
 ) -> Response:
     """Set the plan as it was typed. A field left empty asks for nothing."""
     try:
-        actions.set_plan(session, characteristic, typed(ControlPlanIn, form), caller)
+        required = [field for field in ContextField if form.get(f"required_context.{field.value}") == "true"]
+        actions.set_plan(session, characteristic, typed(ControlPlanIn, form, required_context=required), caller)
     except Invalid as error:
         return _page(request, session, caller, characteristic, form=form, error=error)
     return RedirectResponse(f"/characteristics/{characteristic}/control-plan?done=1", 303)
@@ -68,6 +71,8 @@ def _page(
         row=row,
         plan=plan,
         look=queries.look(session, row) if row and plan.asks else None,
+        lacking=queries.lacking(session, row) if row and plan.required_context else None,
+        context_fields=[(f"required_context.{field.value}", field_word(field)) for field in ContextField],
         lately=queries.missed_lately(session, current.characteristic, datetime.now(UTC)),
         part=part_of(rows, ON_PAGE, before, lambda each: each.missed.id, link),
         form=form if form is not None else _as_typed(plan),
@@ -80,5 +85,7 @@ def _page(
 
 def _as_typed(plan: Plan) -> dict[str, str]:
     """The plan as its form has it; what it does not ask for is left empty."""
-    said = {name: value for name in Plan.__dataclass_fields__ if (value := getattr(plan, name))}
-    return {name: "true" if value is True else f"{value:g}" for name, value in said.items()}
+    numbers = [name for name in Plan.__dataclass_fields__ if name != "required_context"]
+    said = {name: value for name in numbers if (value := getattr(plan, name))}
+    typed_as = {name: "true" if value is True else f"{value:g}" for name, value in said.items()}
+    return typed_as | {f"required_context.{field.value}": "true" for field in plan.required_context}

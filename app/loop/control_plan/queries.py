@@ -4,11 +4,12 @@ from bisect import bisect_right
 from collections.abc import Sequence
 from datetime import UTC, datetime, timedelta
 from itertools import pairwise
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
-from sqlalchemy import ColumnElement, and_, exists, func, or_, select, true
+from sqlalchemy import ColumnElement, and_, exists, func, or_, select, text, true
 from sqlalchemy.orm import Session
 
+from app.core.context import ContextField
 from app.core.control_plan import (
     Due,
     Event,
@@ -22,6 +23,7 @@ from app.core.control_plan import (
     ran,
     rhythm,
 )
+from app.core.decision.step import Code
 from app.core.period import ALWAYS, Period
 from app.db.period import in_period
 from app.loop.characteristics.queries import CurrentCharacteristic
@@ -31,6 +33,7 @@ from app.loop.tables.control_plan import ControlPlan, MissedMeasurement
 from app.loop.tables.machines import Machine
 from app.loop.tables.readings import Stream
 
+MOST_LOOKED_AT = 10_000  # readings at once, for what their context lacks
 LATELY = timedelta(days=30)
 """As far back as pages count."""
 
@@ -60,6 +63,19 @@ class Look(NamedTuple):
     late: list[Interval]
     open: MissedMeasurement | None
     of_part: bool
+
+
+class Lacking(NamedTuple):
+    """What the newest readings lack of the required context. fields: how many lack each that any lacks. last: the last of them."""
+
+    fields: dict[str, int]
+    last: int
+    newest: int
+
+    @property
+    def as_data(self) -> dict[str, Any]:
+        """For its alarm."""
+        return {"fields": list(self.fields), "readings": max(self.fields.values()), "last": self.last}
 
 
 class MissedRow(NamedTuple):
@@ -161,6 +177,50 @@ def _begin(row: ControlPlan, stream: Stream, own: Sequence[signs.Own], now: date
     if not own and stream.last_measured_at is not None:
         since = since._replace(at=max(since.at, min(stream.last_measured_at, now).timestamp()))
     return row.seen, since
+
+
+_LACKING = text("""
+SELECT field, count(*), max(r.sequence) FROM unnest(CAST(:fields AS text[])) AS field, reading r
+LEFT JOIN reading_context c USING (machine_id, characteristic_id, sequence)
+WHERE r.machine_id = :machine AND r.characteristic_id = :characteristic AND r.sequence BETWEEN :first AND :last
+    AND r.code <> :imported AND r.received_at >= :since AND c.context ->> field IS NULL
+GROUP BY field
+""")
+
+
+def lacking(session: Session, row: ControlPlan, after: int = 0) -> Lacking:
+    """What the readings after this one lack of the plan in force, of many the last ones; what was imported lacks nothing."""
+    newest = session.get_one(Stream, (row.machine_id, row.characteristic_id), populate_existing=True).sequence
+    fields = row.plan.required_context
+    where = {
+        "fields": [field.value for field in fields],
+        "machine": row.machine_id,
+        "characteristic": row.characteristic_id,
+        "first": max(after, newest - MOST_LOOKED_AT) + 1,
+        "last": newest,
+        "imported": Code.IMPORTED.value,
+        "since": row.since,
+    }
+    found = {field: (count, last) for field, count, last in session.execute(_LACKING, where)}
+    return Lacking(
+        {field.value: found[field.value][0] for field in fields if field.value in found},
+        max((last for _count, last in found.values()), default=0),
+        newest,
+    )
+
+
+def required_on(session: Session, machine_id: int) -> dict[str, tuple[ContextField, ...]]:
+    """The required context of each characteristic of a machine that has one, by its key."""
+    rows = session.execute(
+        select(Characteristic.key, ControlPlan)
+        .join(
+            ControlPlan,
+            (Characteristic.machine_id == ControlPlan.machine_id)
+            & (Characteristic.id == ControlPlan.characteristic_id),
+        )
+        .where(ControlPlan.machine_id == machine_id, func.cardinality(ControlPlan.required_context) > 0)
+    )
+    return {key: row.plan.required_context for key, row in rows}
 
 
 def open_of(session: Session, row: ControlPlan) -> MissedMeasurement | None:

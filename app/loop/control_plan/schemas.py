@@ -5,6 +5,7 @@ from typing import Annotated, Literal, Self
 
 from pydantic import BaseModel, Field
 
+from app.core.context import ContextField
 from app.core.control_plan import Plan
 from app.loop.control_plan.queries import Look, MissedRow, stated
 from app.loop.control_plan.wording import due_word, plan_words, state_sentences
@@ -19,11 +20,15 @@ _PER_SHIFT = "At least one measurement in each shift in which the part is made."
 _AFTER_CHANGE = "Every part is measured for N readings after a tool change."
 _AFTER_ALARM = "Every part is measured for N readings after an alarm about the characteristic or its tool."
 _ON_THE_WAY = "Parts that lie between the machine and the gauge: they are not missed yet."
+_REQUIRED = (
+    "What the context of every reading must say. One that does not is stored and decided like any other, and raises the alarm "
+    "`context_missing` within a minute; the measuring sheet takes none without."
+)
 _NUMBERED = "Parts are numbered one by one on this machine, so a number that is missing between two is a part."
 
 
 class ControlPlanIn(Body):
-    """A control plan. Without any rule the characteristic is not planned."""
+    """A control plan. Without any rule the characteristic is not planned, and what its context must say stands by itself."""
 
     every: Annotated[Every | None, Field(description=_EVERY)] = None
     minutes: Annotated[float | None, Field(strict=True, gt=0, le=100_000, description=_MINUTES)] = None
@@ -32,12 +37,16 @@ class ControlPlanIn(Body):
     after_alarm: Annotated[Few, Field(description=_AFTER_ALARM)] = 0
     on_the_way: Annotated[Few, Field(description=_ON_THE_WAY)] = 0
     numbered: Annotated[bool, Field(strict=True, description=_NUMBERED)] = False
+    required_context: Annotated[
+        list[ContextField], Field(default_factory=list, max_length=len(ContextField), description=_REQUIRED)
+    ]
     reason: Reason
 
     @property
     def plan(self) -> Plan:
         """As the core has it."""
-        return Plan(**self.model_dump(exclude={"reason"}))
+        required = tuple(field for field in ContextField if field in self.required_context)
+        return Plan(**self.model_dump(exclude={"reason"}) | {"required_context": required})
 
 
 class ControlPlanOut(BaseModel):
@@ -51,6 +60,7 @@ class ControlPlanOut(BaseModel):
     after_alarm: Annotated[int, Field(description=_AFTER_ALARM)]
     on_the_way: Annotated[int, Field(description=_ON_THE_WAY)]
     numbered: Annotated[bool, Field(description=_NUMBERED)]
+    required_context: Annotated[list[ContextField], Field(description=_REQUIRED)]
     since: Annotated[datetime | None, Field(description="It counts from then on; null: there never was a plan.")]
     changed_by: Annotated[str | None, Field(description="Who set it.")]
     reason: Annotated[str | None, Field(description="Why it is so.")]

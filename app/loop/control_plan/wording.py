@@ -1,7 +1,10 @@
 """Sentences about control plans."""
 
+from collections.abc import Iterable
+
 from app.core.control_plan import By, Due, Judged, Plan, Ran, Rhythm, Tightened
 from app.language.i18n import _, ngettext
+from app.loop.readings.wording import field_word
 
 
 def asked(every: int | None, minutes: float | None = None) -> str:
@@ -16,7 +19,7 @@ def asked(every: int | None, minutes: float | None = None) -> str:
 
 def plan_words(plan: Plan) -> str:
     """A plan in one line."""
-    if not plan.asks:
+    if not plan.asks and not plan.required_context:
         return _("No control plan")
     words = [asked(plan.every, plan.minutes)] if plan.every or plan.minutes else []
     if plan.per_shift:
@@ -35,8 +38,15 @@ def plan_words(plan: Plan) -> str:
                 "the next part after an alarm", "each of the next {n} parts after an alarm", plan.after_alarm
             ).format(n=plan.after_alarm)
         )
+    if plan.required_context:
+        words.append(_("each reading with {fields}").format(fields=fields_words(plan.required_context)))
     line = "; ".join(words)
     return line[:1].upper() + line[1:]
+
+
+def fields_words(fields: Iterable[str]) -> str:
+    """Fields of a context in a line."""
+    return ", ".join(field_word(field).lower() for field in fields)
 
 
 def due_word(due: str) -> str:

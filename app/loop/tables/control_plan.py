@@ -2,9 +2,10 @@
 
 from datetime import datetime
 
-from sqlalchemy import BigInteger, CheckConstraint, ForeignKeyConstraint, Identity, Index, func, text
+from sqlalchemy import ARRAY, BigInteger, CheckConstraint, ForeignKeyConstraint, Identity, Index, Text, func, text
 from sqlalchemy.orm import Mapped, mapped_column
 
+from app.core.context import ContextField
 from app.core.control_plan import Plan
 from app.db.base import Base
 
@@ -14,7 +15,8 @@ _OF_CHARACTERISTIC = ["machine_id", "characteristic_id"], ["characteristic.machi
 class ControlPlan(Base):
     """The control plan of a characteristic, as `app.core.control_plan.Plan` has it.
 
-    since: it counts from then on. seen: the last reading that was looked at for missed measurements.
+    since: it counts from then on. seen: the last reading that was looked at for missed measurements, context_seen: for what its
+    context lacks.
     """
 
     __tablename__ = "control_plan"
@@ -33,15 +35,20 @@ class ControlPlan(Base):
     after_alarm: Mapped[int] = mapped_column(server_default="0")
     on_the_way: Mapped[int] = mapped_column(server_default="0")
     numbered: Mapped[bool] = mapped_column(server_default="false")
+    required_context: Mapped[list[str]] = mapped_column(ARRAY(Text), server_default="{}")
     changed_by: Mapped[str]
     reason: Mapped[str]
     since: Mapped[datetime] = mapped_column(server_default=func.now())
     seen: Mapped[int] = mapped_column(BigInteger, server_default="0")
+    context_seen: Mapped[int] = mapped_column(BigInteger, server_default="0")
 
     @property
     def plan(self) -> Plan:
         """As the core has it."""
-        return Plan(**{name: getattr(self, name) for name in Plan.__dataclass_fields__})
+        required = tuple(map(ContextField, self.required_context))
+        return Plan(
+            **{name: getattr(self, name) for name in Plan.__dataclass_fields__} | {"required_context": required}
+        )
 
 
 class MissedMeasurement(Base):

@@ -30,6 +30,7 @@ def made_by(kind: str) -> str:
         "corrections_not_taken": _("INBAND_CORRECTIONS_TAKEN_WITHIN"),
         "tool_life": _("planned life of the edge"),
         "measurement_missed": _("control plan"),
+        "context_missing": _("control plan"),
         "hunting": _("zero range R33 and k"),
         "signal": _("run rule"),
         "bridge_silent": _("INBAND_BRIDGE_SILENT_AFTER"),

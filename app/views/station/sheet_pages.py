@@ -11,8 +11,10 @@ from starlette.responses import RedirectResponse
 from app.access.deps import AtStation, Station
 from app.errors import Conflict, InbandError
 from app.language.i18n import _
+from app.loop.control_plan import queries as control_plans
 from app.loop.machines.queries import machine_named
 from app.loop.readings.by_hand import sheet_actions as sheet
+from app.loop.readings.wording import field_word
 from app.views.station.who import REFUSED, asked, who
 from app.web.deps import FormDep, SessionDep, Word
 from app.web.paging import address
@@ -45,11 +47,12 @@ def send_sizes(request: Request, session: SessionDep, at: Station, machine: str,
     named = machine_named(session, machine)
     shown = sheet.sheet_of(session, named, of, only)
     try:
-        found = sheet.filled(shown, form, "", datetime.now(UTC))
+        required = control_plans.required_on(session, named.id)
+        found = sheet.filled(shown, form, "", datetime.now(UTC), required)
         if found.questions:
             return _sheet(request, session, at, machine, of, only, form=form, questions=found.questions)
         caller = who(request, session, at, form)
-        found = sheet.filled(shown, form, caller.name, datetime.now(UTC))
+        found = sheet.filled(shown, form, caller.name, datetime.now(UTC), required)
         sheet.store(session, request.app.state.doors, request.app.state.writer, named, found, caller)
     except (*REFUSED, Conflict) as error:
         return _sheet(request, session, at, machine, of, only, form=form, error=error)
@@ -73,6 +76,8 @@ def _sheet(
     shown = sheet.sheet_of(session, named, of, only)
     stored = sheet.stored_of(session, shown, done) if done else []
     kept = stored[0][2] if stored else {}
+    required = control_plans.required_on(session, named.id)
+    needed = {field for line in shown.lines for field in required.get(line.entry.characteristic, ())}
     return page(
         request,
         "station/sheet.html",
@@ -85,7 +90,8 @@ def _sheet(
             for name in shown.drawings
         ],
         key=form.get("key") or token_hex(8),
-        typed={"order": kept.get("order"), "gauge": kept.get("gauge")} | dict(form),
+        typed={field.value: kept.get(field.value) for field in sheet.SCANNED} | dict(form),
+        scanned=[(field.value, field_word(field), field in needed) for field in sheet.SCANNED],
         stored=stored,
         questions=questions or {},
         address=address,

@@ -36,7 +36,8 @@ class MeasuringSheet extends HTMLElement {
   }
 
   get fields() {
-    return [...this.form.querySelectorAll("input:not([type=hidden], [type=radio], [type=checkbox])")];
+    const all = [...this.form.querySelectorAll("input:not([type=hidden], [type=radio], [type=checkbox])")];
+    return all.filter((input) => !input.closest("details:not([open])"));
   }
 
   showPad() {

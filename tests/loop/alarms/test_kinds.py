@@ -81,6 +81,7 @@ DATA: dict[str, list[dict[str, Any]]] = {
         {"by": "minutes", "minutes": 75, "every": 10, "minutes_planned": 60},
         {"by": "shift"},
     ],
+    "context_missing": [{"fields": ["order", "nest"], "readings": 1}, {"fields": ["batch"], "readings": 40}],
     "hunting": [],  # worded with the settings: by the tests of wear
     "signal": [],  # with the chart: by the tests of signals
     "calibration_refused": [],  # with the refusal: by the tests of calibration

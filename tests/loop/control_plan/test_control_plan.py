@@ -320,3 +320,44 @@ def test_its_page(shop: Shop, other: str, server: Server) -> None:
     assert "not yet" in page
     assert "each of the first 3 parts after a tool change" in page
     assert f'href="{here}"' in engineer.open(f"/characteristics/{shop.characteristic}")
+
+
+def test_what_a_reading_must_say_is_asked_for_and_never_costs_the_reading(shop: Shop) -> None:
+    shop.read(0.1)
+    assert plan(shop, required_context=["nest", "order"])["required_context"] == ["order", "nest"]
+    assert look(shop) == [], "what came before the plan lacks nothing"
+    assert shop.read(0.2, context={"order": "A-1", "nest": 0})["sequence"] == 2
+    assert look(shop) == []
+    assert shop.read(0.3, context={"order": "A-1"})["sequence"] == 3, "stored all the same"
+    shop.read(0.4, context={"order": "A-1", "nest": 2})
+    (alarm,) = look(shop)
+    assert (alarm["kind"], alarm["characteristic"]) == ("context_missing", shop.characteristic)
+    assert "1 reading does not say" in alarm["text"]
+    assert "nest" in alarm["text"]
+    assert "order" not in alarm["text"]
+    assert look(shop)[0]["count"] == 1, "no reading, no look"
+    shop.read(0.5, context={"order": "A-1", "nest": 1})
+    assert look(shop) == []
+    (ended,) = shop.alarms("acknowledged")
+    assert ended["outcome"][0]["sequence"] == 5
+
+
+def test_an_alarm_about_context_ends_with_the_rule(shop: Shop) -> None:
+    plan(shop, required_context=["order"], every=1)
+    shop.read(0.1)
+    assert [alarm["kind"] for alarm in look(shop)] == ["context_missing"]
+    plan(shop, every=1)
+    assert look(shop) == []
+    plan(shop, 422, required_context=["colour"])
+
+
+def test_the_page_sets_what_a_reading_must_say_and_shows_what_lacks_it(shop: Shop, server: Server) -> None:
+    engineer = Person(server, "engineer")
+    path = f"/characteristics/{shop.characteristic}/control-plan"
+    engineer.send(path, reason=WHY, **{"required_context.order": "true", "required_context.batch": "true"})
+    shop.read(0.1, context={"order": "A-1"})
+    page = engineer.open(path)
+    assert "Each reading says: order, batch." in page
+    assert "1 reading since then lacks it: batch." in page
+    engineer.send(path, reason=WHY, every="5")
+    assert shop.call("GET", path)["required_context"] == []

@@ -191,3 +191,16 @@ class TestByTouch:
         assert shop.call("GET", f"/readings/{other}/1")["measured"] == 39.9985
         expect(page.get_by_label("Gauge")).to_have_value("Micrometer 4")
         expect(page.get_by_label("Part")).to_have_value("")
+
+
+def test_what_the_control_plan_requires_is_scanned_before_a_size_is_stored(sheet: Sheet, operator: Person) -> None:
+    shop, name = sheet.shop, sheet.shop.characteristic
+    shop.call("PUT", f"/characteristics/{name}/control-plan", required_context=["order", "nest"], reason="Agreed")
+    assert "control plan requires it" in sheet.send(422, sizes={name: "40.001"}, order="A-1")
+    assert "whole number" in sheet.send(422, sizes={name: "40.001"}, order="A-1", nest="two")
+    assert shop.call("GET", f"/readings?characteristic={name}")["items"] == []
+    stored = sheet.send(sizes={name: "40.001"}, order="A-1", nest="2", batch="C 7")
+    assert 'name="batch" type="text"\n  value="C 7"' in stored, "the next part is most likely of the same"
+    said = {"order": "A-1", "nest": 2, "batch": "C 7", "operator": operator.name, "by_hand": True}
+    context = shop.call("GET", f"/readings/{name}/1")["context"]
+    assert {field: value for field, value in context.items() if value is not None} == said

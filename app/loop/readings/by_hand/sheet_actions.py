@@ -14,6 +14,7 @@ from sqlalchemy.orm import Session
 
 from app.access.audit.actions import record
 from app.access.callers import Caller
+from app.core.context import ContextField
 from app.core.number_text import NotANumber, NumberFault, plain, read_number
 from app.core.parameters import LARGEST_LENGTH, Parameters, Variant
 from app.core.plausibility import is_doubtful, looks_like_inches
@@ -42,7 +43,12 @@ MUST_BE_SAID = timedelta(hours=1)
 LATEST = "now"
 """Answer to the question: the part was cut with the offset as it is."""
 LONGEST_TEXT = 128
+SCANNED = tuple(field for field in ContextField if field is not ContextField.OPERATOR)
+"""Fields of the context that the sheet asks for; the operator is the person who stores it."""
 _KEY = re.compile(r"[0-9a-f]{16}", re.ASCII)
+
+
+NONE_REQUIRED: Mapping[str, tuple[ContextField, ...]] = {}
 
 
 class SheetLine(NamedTuple):
@@ -126,20 +132,29 @@ def sections_of(parameters: Parameters) -> int:
     return parameters.accept_m if parameters.variant is not Variant.TWO_POINT and parameters.repeats == 1 else 0
 
 
-def filled(sheet: Sheet, form: Mapping[str, str], person: str, now: datetime) -> Filled:
-    """Read what was typed. Raises `Invalid` naming every field that is wrong, and when there is no size at all."""
+def filled(
+    sheet: Sheet,
+    form: Mapping[str, str],
+    person: str,
+    now: datetime,
+    required: Mapping[str, tuple[ContextField, ...]] = NONE_REQUIRED,
+) -> Filled:
+    """Read what was typed or scanned. Raises `Invalid` naming every field that is wrong, and when there is no size at all.
+
+    required: what the context must say, by the key of the characteristic.
+    """
     key, errors = form.get("key", ""), []
     if not _KEY.fullmatch(key):
         raise Invalid.at("key", _("this sheet has no number; open it again"))
     texts = {}
-    for name in ("part", "order", "gauge"):
+    for name in ("part", *SCANNED):
         texts[name] = form.get(name, "").strip()
         if len(texts[name]) > LONGEST_TEXT or not clean_text(texts[name]):
             errors.append(FieldError(name, _("at most {n} letters, digits and signs").format(n=LONGEST_TEXT)))
     cut_at, wrong = _cut_at(sheet, form.get("cut", ""))
-    context = Context(
-        order=texts["order"] or None, operator=person[:LONGEST_TEXT], gauge=texts["gauge"] or None, by_hand=True
-    )
+    if texts["nest"] and not (texts["nest"].isascii() and texts["nest"].isdigit() and len(texts["nest"]) < 7):
+        errors.append(FieldError("nest", _("a nest is a whole number from 0 to 999999")))
+        texts["nest"] = ""
     taken: list[tuple[Entry, ReadingIn]] = []
     questions: dict[str, str] = {}
     for line in sheet.lines:
@@ -159,17 +174,30 @@ def filled(sheet: Sheet, form: Mapping[str, str], person: str, now: datetime) ->
             machined_at=cut_at,
             part=texts["part"] or None,
             key=f"by-hand:{key}",
-            context=context,
+            context=_context(texts, person),
         )
         taken.append((line.entry, reading))
     if wrong and taken:
         errors.append(wrong)
+    needed = {each for entry, _reading in taken for each in required.get(entry.characteristic, ())}
+    errors += [
+        FieldError(name, _("the control plan requires it with each reading; scan or type it"))
+        for name in SCANNED
+        if name in needed and not texts[name] and all(error.field != name for error in errors)
+    ]
     if not taken and not errors:
         name = next((name for line in sheet.lines for name in line.fields), "part")
         errors.append(FieldError(name, _("type a size first")))
     if errors:
         raise Invalid(_("The sheet has to be corrected. Nothing was stored."), errors=errors)
     return Filled(taken, questions)
+
+
+def _context(texts: Mapping[str, str], person: str) -> Context:
+    said: dict[str, Any] = {field.value: texts[field] for field in SCANNED if texts[field]}
+    if "nest" in said:
+        said["nest"] = int(said["nest"])
+    return Context(**said, operator=person[:LONGEST_TEXT], by_hand=True)
 
 
 def _sizes(line: SheetLine, form: Mapping[str, str], errors: list[FieldError]) -> dict[str, float]:
