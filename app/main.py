@@ -62,6 +62,8 @@ from app.loop.notes import api as notes
 from app.loop.notes import pages as note_pages
 from app.loop.notifications import api as notifications
 from app.loop.notifications.notifier import Notifier
+from app.loop.present_context import actions as present_context
+from app.loop.present_context import api as present_context_api
 from app.loop.programs import api as programs
 from app.loop.quarantine import api as quarantine
 from app.loop.quarantine import pages as quarantine_pages
@@ -209,6 +211,7 @@ ROUTERS: tuple[APIRouter, ...] = (
     reactions.router,
     quarantine.router,
     control_plan.router,
+    present_context_api.router,
     notes.router,
     notifications.router,
     events_api.router,
@@ -276,6 +279,7 @@ JOBS: tuple[PeriodicJob, ...] = (
     *tool_jobs.JOBS,
     wear_actions.JOB,
     jobs.JOB,
+    present_context.JOB,  # before what looks for context that is missing
     control_plan_jobs.JOB,
     report_actions.JOB,
     signals_actions.JOB,

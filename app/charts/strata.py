@@ -65,4 +65,4 @@ def _told_apart(drawn: Series, labels: Sequence[int] | Mapping[Any, int], names:
     hover = drawn.hover
     if not isinstance(hover, str):
         hover = [f"{words}<br>{names[n]}" if n >= 0 else words for words, n in zip(hover, of, strict=True)]
-    return replace(drawn, dots=replace(dots, symbol=symbols, colour=colours, edge=None), hover=hover)
+    return replace(drawn, dots=replace(dots, symbol=symbols, colour=colours, edge=None), hover=hover, name="")

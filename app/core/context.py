@@ -1,4 +1,4 @@
-"""Circumstances of a reading by which readings are told apart: its order, its batch, its nest and others."""
+"""Circumstances of a reading by which readings differ: its order, its batch, its nest and others."""
 
 from collections.abc import Mapping
 from enum import StrEnum

@@ -82,6 +82,7 @@ ADDED_TABLES = {
     "quarantine",
     "quarantined_part",
     "control_plan",
+    "present_context",
     "missed_measurement",
     "machine_run",
     "reaction_plan",

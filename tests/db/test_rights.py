@@ -30,6 +30,7 @@ PASSING = {
     "capability_verdict",
     "connection",
     "control_plan",
+    "present_context",
     "delivery",
     "event",
     "fixture",

@@ -446,6 +446,7 @@ FORMS: dict[str, tuple[str, ...] | None] = {
     "/station": None,
     "/station/{machine}/alarms/{number}": None,  # on a device it is asked who acts: tests/views/station
     "/station/{machine}/alarms/{number}/photos": None,
+    "/station/{machine}/context": None,
     "/station/{machine}/corrections/{number}": None,
     "/station/{machine}/note": None,
     "/station/{machine}/sizes": None,

@@ -3,7 +3,7 @@
 A process drifts: tools wear, corrections act, shifts warm up. Two orders made one after the other nearly always have other means,
 and an analysis of variance of all readings would blame the order. So neighbours alone are compared: readings in blocks of ten, what a
 block has in common is taken out, and what is left is tested for the strata (analysis of variance of incomplete blocks, F
-adjusted for blocks). Only a block with readings of several strata tells anything; strata that never met as neighbours cannot be told
+adjusted for blocks). Only a block with readings of several strata tells anything; strata that never met as neighbours cannot be known
 from the time that lies between them, and then there is no answer.
 
 Source: D. C. Montgomery, Design and Analysis of Experiments (2017), section 4.4, intrablock analysis.
@@ -24,9 +24,9 @@ from app.core.spc.refusal import Floats, Refused, checked
 BLOCK = 10
 """Neighbours that are compared; what drifts within so few is small."""
 FEWEST_BLOCKS = 5
-"""In so many blocks a stratum must have met others, or it is left out of the test."""
+"""A stratum that has met others in fewer blocks is left out of the test."""
 MOST_BLOCKS = 2_000
-"""Of more blocks so many, evenly spread: with more of them what does not matter becomes significant."""
+"""Of more blocks this many, evenly spread: with more of them what does not matter becomes significant."""
 
 
 class NoAnswer(StrEnum):
@@ -74,10 +74,14 @@ def strata(
     for at, name in enumerate(names):
         of = values[labels == at]
         if len(of):
-            result = or_refused(lambda of=of: capability(of, limits, confidence=confidence))
-            ppk = result if isinstance(result, Refused) else result.ppk
-            found.append(Stratum(name, len(of), float(of.mean()), float(of.std(ddof=1)) if len(of) > 1 else None, ppk))
+            spread = float(of.std(ddof=1)) if len(of) > 1 else None
+            found.append(Stratum(name, len(of), float(of.mean()), spread, _ppk(of, limits, confidence)))
     return found
+
+
+def _ppk(values: Floats, limits: Limits, confidence: float) -> Index | Refused:
+    result = or_refused(lambda: capability(values, limits, confidence=confidence))
+    return result if isinstance(result, Refused) else result.ppk
 
 
 def differ(values: ArrayLike, labels: NDArray[np.int64]) -> Difference | NoAnswer:

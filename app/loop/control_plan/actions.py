@@ -18,6 +18,7 @@ from app.loop.control_plan.alarm_kinds import CONTEXT_MISSING, MISSED
 from app.loop.control_plan.queries import Look
 from app.loop.control_plan.schemas import ControlPlanIn
 from app.loop.machines.queries import lock_machines
+from app.loop.present_context import actions as present_context
 from app.loop.tables.characteristics import Characteristic
 from app.loop.tables.control_plan import ControlPlan, MissedMeasurement
 from app.loop.tables.machines import Machine
@@ -47,14 +48,15 @@ def set_plan(session: Session, key: str, given: ControlPlanIn, caller: Caller) -
     state.planned = queries.any_counts_parts(session, machine.id)
     _end(session, row, machine.key, key, by=caller.name, comment=given.reason, outcome={"code": "plan_changed"})
     _end_context(session, row, machine.key, key, by=caller.name, comment=given.reason, outcome={"code": "plan_changed"})
-    said = _fields(before), _fields(after)
-    changes = {name for name, value in said[1].items() if value != said[0][name]}
+    old, new = _fields(before), _fields(after)
+    changes = {name for name, value in new.items() if value != old[name]}
     record(
         session,
         caller.name,
         "control plan set",
         f"characteristic/{key}",
-        *({name: fields[name] for name in changes} for fields in said),
+        {name: old[name] for name in changes},
+        {name: new[name] for name in changes},
         given.reason,
     )
     publish(session, {"kind": "characteristic", "machine": machine.key, "characteristic": key})
@@ -118,6 +120,7 @@ def keep_context(session: Session, machine_id: int, characteristic_id: int) -> N
     It ends with readings of which none lacks anything. The machine is locked only where there is an alarm.
     """
     row = session.get_one(ControlPlan, (machine_id, characteristic_id), populate_existing=True)
+    present_context.fill(session, machine_id)
     lacking = queries.lacking(session, row, row.context_seen)
     if lacking.newest <= row.context_seen:
         return

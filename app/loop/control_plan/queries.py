@@ -66,7 +66,7 @@ class Look(NamedTuple):
 
 
 class Lacking(NamedTuple):
-    """What the newest readings lack of the required context. fields: how many lack each that any lacks. last: the last of them."""
+    """Required context that the newest readings lack. fields: how many lack each that any lacks. last: the last of them."""
 
     fields: dict[str, int]
     last: int
@@ -189,7 +189,7 @@ GROUP BY field
 
 
 def lacking(session: Session, row: ControlPlan, after: int = 0) -> Lacking:
-    """What the readings after this one lack of the plan in force, of many the last ones; what was imported lacks nothing."""
+    """The required context that readings after this one lack, of many the last ones; what was imported lacks nothing."""
     newest = session.get_one(Stream, (row.machine_id, row.characteristic_id), populate_existing=True).sequence
     fields = row.plan.required_context
     where = {

@@ -48,7 +48,7 @@ def context_form(
             (f"context.{field.value}", field_word(field), chosen.get(field, ""), offered.get(field, []))
             for field in fields
         ],
-        [("", _("not told apart")), *((field.value, field_word(field)) for field in fields)],
+        [("", _("nothing")), *((field.value, field_word(field)) for field in fields)],
         by.value if by else "",
         " · ".join(filter(None, words)),
     )

@@ -18,7 +18,8 @@ from app.quality.capability.schemas import (
     capability_out,
     machine_performance_out,
 )
-from app.quality.capability.strata import StrataOut, strata_of, strata_out
+from app.quality.capability.strata_queries import strata_of
+from app.quality.capability.strata_schemas import StrataOut, strata_out
 from app.quality.capability.verdict_queries import states
 from app.quality.capability.weekly import tool_changes, weeks_of
 from app.web.api import FIGURE, CharacteristicKey, Theme, api_router, chart_answer, problems
@@ -45,7 +46,9 @@ def get_strata(
     caller: AnyCaller,
     characteristic: CharacteristicKey,
     choice: StudyRequestDep,
-    by: Annotated[ContextField, Query(description="The field of the context that tells them apart.")],
+    by: Annotated[
+        ContextField, Query(description="The field of the context that they are split by.", examples=["nest"])
+    ],
 ) -> StrataOut:
     """The readings of a capability study apart by order, nest, operator …: mean, s and Ppk of each, and whether they differ.
 

@@ -191,7 +191,7 @@ def get_control_chart(
     ] = None,
     by: Annotated[
         ContextField | None,
-        Query(description="Tell points apart by this field of their readings' context: colour, shape and legend."),
+        Query(description="Split points by this field of their readings' context: colour, shape and legend."),
     ] = None,
     theme: Theme = "light",
     width: Width = 1240,

@@ -105,7 +105,7 @@ class SampledIn(WhatIfIn):
 class WhatIfByIn(WhatIfIn):
     """The same, with the results apart by a field of the readings' context."""
 
-    by: Annotated[ContextField | None, Field(description="The field by which results are told apart.")] = None
+    by: Annotated[ContextField | None, Field(description="The field by which results are split.")] = None
 
 
 class MapIn(SettingsIn):
@@ -212,7 +212,7 @@ class ResultOut(BaseModel):
 
     mean: float | None
     spread: float | None = Field(description="Standard deviation of the sample.")
-    outside: int
+    outside: int = Field(description="Parts outside today's tolerance, without probe faults.")
 
 
 class ReplayedStratumOut(BaseModel):

@@ -1,6 +1,6 @@
-"""What truly happened and what a replay would have done, apart by order, nest, operator …. Never writes.
+"""The past as it was and as a replay would have made it, split by order, nest, operator …. Never writes.
 
-The loop corrects one tool for all of them, so it is replayed with all readings; only its results are told apart.
+The loop corrects one tool for all of them, so it is replayed with all readings; only its results are split.
 """
 
 from typing import NamedTuple

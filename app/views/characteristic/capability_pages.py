@@ -1,9 +1,11 @@
 """Page: the capability of a characteristic."""
 
+from collections.abc import Callable
 from typing import Annotated, Any, Literal
 from urllib.parse import urlencode
 
 from fastapi import APIRouter, Query, Request, Response
+from sqlalchemy.orm import Session
 
 from app.access.deps import AnyCaller, require
 from app.core.context import Chosen, ContextField
@@ -18,11 +20,11 @@ from app.loop.characteristics import queries as characteristics
 from app.loop.readings.wording import field_word
 from app.loop.summaries import queries as summaries
 from app.loop.summaries import wording as statistics
-from app.quality.capability import fit_wording, machine_wording, strata, wording
+from app.quality.capability import fit_wording, machine_wording, strata_queries, strata_wording, wording
 from app.quality.capability.kinds import SigmaBy
 from app.quality.capability.machine_queries import newest_run
 from app.quality.capability.pictures import interval
-from app.quality.capability.queries import CONFIDENCE, USUAL, Side
+from app.quality.capability.queries import CONFIDENCE, USUAL, Side, Study
 from app.quality.capability.request import Confidence, Last, OfSigma, OneSide, StudyRequest, study_of
 from app.quality.gauge_studies import queries as gauges
 from app.quality.gauge_studies import wording as gauge_wording
@@ -107,32 +109,14 @@ def capability_page(
         parameters=current.parameters,
         choice=choice,
         kept=kept,
-        of_context=statistics.context_form(
-            summaries.offered(session, current.characteristic), choice.context, by or None
-        ),
-        kept_range={name: value for name, value in now.items() if name != "by" and not name.startswith("context.")},
-        strata=strata.strata_of(session, study, by) if by else None,
-        strata_words=strata,
-        field_word=field_word,
+        **_split(session, study, choice, by or None),
         link=link,
         tool_since=summaries.tool_since(session, current.characteristic),
         runs=[
             (_("All") if run == "all" else run, link(last=run), not timed and run == (choice.last or str(USUAL)))
             for run in RUNS
         ],
-        sides=[
-            (words, link(side=side), side == choice.side)
-            for side, words in (
-                ("both", _("Both limits")),
-                ("upper", _("Upper only")),
-                ("lower", _("Lower only")),
-            )
-            if study.natural_limit is NaturalLimit.NONE
-        ],
-        sigmas=[
-            (wording.sigma_by(by), link(sigma_by=None if by is SigmaBy.NEIGHBOURS else by.value), by is choice.sigma_by)
-            for by in SigmaBy
-        ],
+        **_choices(study, choice, link),
         figure=figure,
         interval=interval,
         refused=lambda value: isinstance(value, Refused),
@@ -150,6 +134,37 @@ def capability_page(
         proof_failing=failing,
         proof_warning=proof_wording.warning(len(failing)),
     )
+
+
+def _choices(study: Study, choice: StudyRequest, link: Callable[..., str]) -> dict[str, Any]:
+    """The limits to choose from, and the readings whose differences give sigma within."""
+    return {
+        "sides": [
+            (words, link(side=side), side == choice.side)
+            for side, words in (
+                ("both", _("Both limits")),
+                ("upper", _("Upper only")),
+                ("lower", _("Lower only")),
+            )
+            if study.natural_limit is NaturalLimit.NONE
+        ],
+        "sigmas": [
+            (wording.sigma_by(by), link(sigma_by=None if by is SigmaBy.NEIGHBOURS else by.value), by is choice.sigma_by)
+            for by in SigmaBy
+        ],
+    }
+
+
+def _split(session: Session, study: Study, choice: StudyRequest, by: ContextField | None) -> dict[str, Any]:
+    """The form for the context, and the readings split by a field of it."""
+    offered = summaries.offered(session, study.current.characteristic)
+    return {
+        "of_context": statistics.context_form(offered, choice.context, by),
+        "kept_range": _query(choice._replace(context=())),
+        "strata": strata_queries.strata_of(session, study, by) if by else None,
+        "strata_words": strata_wording,
+        "field_word": field_word,
+    }
 
 
 def _query(choice: StudyRequest) -> dict[str, str]:

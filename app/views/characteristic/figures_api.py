@@ -27,7 +27,7 @@ ResultName = Literal["run_out", "out_of_roundness", "taper", "straightness", "re
 
 By = Annotated[
     ContextField | None,
-    Query(description="Tell single readings apart by this field of their context: colour, shape and legend."),
+    Query(description="Split single readings by this field of their context: colour, shape and legend."),
 ]
 
 

@@ -34,7 +34,7 @@ from app.views.approvals.verbs import APPROVE_ALL, shown_in
 from app.views.approvals.verbs import OfTool as Together
 from app.views.characteristic.glance import band_picture
 from app.views.characteristic.wording import state_word
-from app.views.station import picture_pages, queries, sheet_pages
+from app.views.station import context_pages, picture_pages, queries, sheet_pages
 from app.views.station.who import REFUSED, asked, who
 from app.views.station.wording import next_action
 from app.web.deps import SESSION_COOKIE, STATION_COOKIE, FormDep, Number, SessionDep, SettingsDep, Word, from_this_site
@@ -47,7 +47,7 @@ from app.web.templates import page
 from app.web.verb import Verb, carry_out, named, said
 
 router = APIRouter(prefix="/station", include_in_schema=False)
-router.routes += [*sheet_pages.router.routes, *picture_pages.router.routes]
+router.routes += [*sheet_pages.router.routes, *context_pages.router.routes, *picture_pages.router.routes]
 NO_FORM: Mapping[str, str] = {}
 NOBODY = Caller("person", "")
 """Asks the question; who acts is asked with it."""

@@ -354,7 +354,7 @@ def test_an_alarm_about_context_ends_with_the_rule(shop: Shop) -> None:
 def test_the_page_sets_what_a_reading_must_say_and_shows_what_lacks_it(shop: Shop, server: Server) -> None:
     engineer = Person(server, "engineer")
     path = f"/characteristics/{shop.characteristic}/control-plan"
-    engineer.send(path, reason=WHY, **{"required_context.order": "true", "required_context.batch": "true"})
+    engineer.send(path, 200, reason=WHY, **{"required_context.order": "true", "required_context.batch": "true"})
     shop.read(0.1, context={"order": "A-1"})
     page = engineer.open(path)
     assert "Each reading says: order, batch." in page

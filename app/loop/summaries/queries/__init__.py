@@ -5,7 +5,7 @@ readings cost little more than ten thousand, and no extreme is thinned away.
 """
 
 from app.loop.summaries.queries.chart_data import ChartData, ChartReading, chart_data_of, moments_of, single_readings
-from app.loop.summaries.queries.context import Strata, in_context, offered, strata_of
+from app.loop.summaries.queries.context import OLDER, WITHOUT, Strata, in_context, offered, strata_of
 from app.loop.summaries.queries.history import History, history_of
 from app.loop.summaries.queries.numbers import MOST_IN_HISTOGRAM, Numbers, Unworn, histogram_of, numbers_of, unworn_of
 from app.loop.summaries.queries.pyramid import Block
@@ -21,6 +21,8 @@ from app.loop.summaries.queries.window import Window, window_of
 
 __all__ = [
     "MOST_IN_HISTOGRAM",
+    "OLDER",
+    "WITHOUT",
     "Block",
     "ChartData",
     "ChartReading",
