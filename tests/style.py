@@ -12,7 +12,7 @@ import tokenize
 from collections.abc import Iterable, Iterator
 from pathlib import Path
 
-LONGEST_FUNCTION = 79  # lines, from `def` to the end, docstring included
+LONGEST_FUNCTION = 80  # lines, from `def` to the end, docstring included
 LONGEST_FILE = 519
 QUESTIONS = {"What", "Whether", "How", "Which", "Who", "Whose", "Where", "When", "Why"}
 WIDEST_TEMPLATE = 160  # columns

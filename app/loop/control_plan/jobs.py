@@ -5,7 +5,7 @@ from sqlalchemy.orm import Session
 
 from app.jobs.actions import PeriodicJob, Unit
 from app.loop.control_plan.actions import keep, keep_context
-from app.loop.control_plan.tables import ControlPlan
+from app.loop.tables.control_plan import ControlPlan
 
 # Nothing can have been missed where neither this characteristic nor another one of its part had a reading since, nor the control
 # reported that it runs. After half a day without any, the last look knew all. In no order: not all may be
