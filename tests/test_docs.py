@@ -149,8 +149,11 @@ class TestReadme:
         for name, _command in generate.commands():
             assert f" {name.split()[1]} " in done.stdout
 
-    def test_the_picture_is_there_and_small(self) -> None:
-        assert 10_000 < (HOUSE / "docs" / "images" / "zone-chart.png").stat().st_size < 200_000
+    def test_pictures_are_small_and_each_is_shown(self) -> None:
+        text = "".join(path.read_text() for path in generate.documents())
+        for picture in (HOUSE / "docs" / "images").iterdir():
+            assert 10_000 < picture.stat().st_size < 80_000
+            assert f"images/{picture.name})" in text, "python -m docs.pictures takes pictures that a document shows"
 
 
 class TestEveryDocument:

@@ -1,0 +1,97 @@
+"""Takes the pictures of `docs/images` from a demonstration that runs: `python -m docs.pictures [--only NAME] [--data-dir FOLDER]`.
+
+Start it first, with a past, in a folder of its own (`inband demo --past 14 --data-dir FOLDER`), and wait until it is live. The
+pictures have few colours, so that a wheel with all of them stays small.
+"""
+
+import argparse
+import io
+import json
+import shutil
+import sys
+from pathlib import Path
+from typing import NamedTuple
+
+from PIL import Image
+from playwright.sync_api import Browser, Page, sync_playwright
+
+from app import HOUSE
+
+IMAGES = HOUSE / "docs" / "images"
+COLOURS = 112  # of a picture
+DRAWN = "() => [...document.querySelectorAll('plotly-chart')].every((chart) => chart.drawn)"
+
+
+class Picture(NamedTuple):
+    """A picture: address of the page, the part of it that is shown, and the size of the screen."""
+
+    address: str
+    part: str = "main"
+    size: tuple[int, int] = (1180, 760)
+
+
+PICTURES = {
+    "zone-chart": Picture("/characteristics/flange-d62?last=200", "plotly-chart.zones > .plot", (1240, 1120)),
+    "alarms": Picture("/alarms", size=(1000, 620)),
+    "approvals": Picture("/corrections", size=(1000, 620)),
+    "station": Picture("/station/lathe-2", "body", (1000, 660)),
+    "sizes-by-hand": Picture("/station/lathe-1/sizes", "body", (1000, 720)),
+    "set-up": Picture("/setup/characteristics/new", size=(1180, 800)),
+    "six-pack": Picture("/characteristics/shaft-d40/six-pack", size=(1240, 800)),
+    "what-if-map": Picture("/characteristics/plate-d30/what-if#map", "#map"),
+    "wear-curve": Picture("/characteristics/shaft-d40", "#wear-curve", (1180, 1500)),
+    "shift": Picture("/shift"),
+}
+
+
+def taken(browser: Browser, url: str, people: dict[str, str], picture: Picture) -> bytes:
+    """The picture as PNG."""
+    width, height = picture.size
+    page = browser.new_page(base_url=url, viewport={"width": width, "height": height}, color_scheme="light")
+    _sign_in(page, people)
+    page.goto(picture.address)
+    while not page.evaluate(DRAWN):  # the page's policy lets no string be evaluated in it again and again
+        page.wait_for_timeout(100)
+    part = page.locator(picture.part)
+    part.scroll_into_view_if_needed()
+    box = part.bounding_box()
+    assert box is not None, picture
+    top = max(0.0, box["y"])
+    shown = {"x": box["x"], "y": top, "width": box["width"], "height": min(box["y"] + box["height"], height) - top}
+    raw = page.screenshot(clip=shown)  # type: ignore[arg-type]
+    page.close()
+    small = io.BytesIO()
+    Image.open(io.BytesIO(raw)).convert("RGB").quantize(COLOURS, dither=Image.Dither.NONE).save(
+        small, "PNG", optimize=True
+    )
+    return small.getvalue()
+
+
+def _sign_in(page: Page, people: dict[str, str]) -> None:
+    page.goto("/sign-in")
+    page.get_by_label("Name").fill("engineer")
+    page.get_by_label("Password").fill(people["engineer"])
+    page.locator("main button[type=submit]").click()
+    page.wait_for_url(lambda at: not at.endswith("/sign-in"))
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--url", default="http://127.0.0.1:8000")
+    parser.add_argument(
+        "--data-dir", type=Path, default=Path("data"), help="of the demonstration: its passwords are there"
+    )
+    parser.add_argument("--only", action="append", choices=PICTURES)
+    arguments = parser.parse_args()
+    people = json.loads((arguments.data_dir / "demo.json").read_text())
+    chromium = next(filter(None, map(shutil.which, ("chromium", "chromium-headless-shell", "google-chrome"))), None)
+    with sync_playwright() as playwright:
+        browser = playwright.chromium.launch(executable_path=chromium, args=["--no-sandbox"])
+        for name in arguments.only or PICTURES:
+            data = taken(browser, arguments.url, people, PICTURES[name])
+            (IMAGES / f"{name}.png").write_bytes(data)
+            sys.stdout.write(f"{name}.png {len(data) / 1000:.0f} kB\n")
+
+
+if __name__ == "__main__":
+    main()
