@@ -2,14 +2,13 @@
 //
 // Each is scaled to 1600 points in the browser and shown with its size. The form is sent first, as if there were no photo; then
 // each photo by itself, with the same person. A photo that cannot be sent changes nothing of what the form has done: it says why,
-// and is sent again or left out. In a form that is sent to `src` itself the photos are all there is,
-// and its button asks for one as long as there is none.
-//
+// and is sent again or left out. In a form sent to `src` itself its button asks for a photo as long as there is none.
 // Without script the box stays hidden; a plain field of files stands beside it ([data-plain]), or on the page of the alarm.
 
 const LONGEST = 1600;
 const OF_PERSON = ["csrf", "who", "other_name", "pin", "badge"];
 const fill = (words, values) => words.replace(/\{(\w+)\}/g, (_all, name) => values[name]);
+const reason = (page) => page.querySelector(".problem h1 + p, .problem h1, h1")?.textContent.trim() ?? ""; // what a page says is wrong
 const sizeOf = (bytes) => (bytes < 1e6 ? `${Math.ceil(bytes / 1e3)} kB` : `${(bytes / 1e6).toFixed(1)} MB`);
 
 async function scaled(file) {
@@ -143,11 +142,6 @@ class PhotoBox extends HTMLElement {
     actions.replaceChildren(again, on);
     this.scrollIntoView({ block: "nearest" });
   }
-}
-
-/** What a page says is wrong. */
-function reason(page) {
-  return page.querySelector(".problem h1 + p, .problem h1, h1")?.textContent.trim() ?? "";
 }
 
 customElements.define("photo-box", PhotoBox);
