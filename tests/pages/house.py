@@ -26,6 +26,7 @@ PAGES = {
         "/station/{machine}/alarms/{alarm}?action=measured_by_hand",
     ],
     "/station/{machine}/corrections/{number}": ["/station/{machine}/corrections/{waiting}?do=approve"],
+    "/station/{machine}/context": ["/station/{machine}/context"],
     "/station/{machine}/note": ["/station/{machine}/note"],
     "/station/{machine}/sizes": ["/station/{machine}/sizes"],
     "/notes": ["/notes", "/notes?machine={machine}", "/notes?characteristic={characteristic}"],

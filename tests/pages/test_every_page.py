@@ -51,6 +51,7 @@ BESIDE_THE_MACHINE = {
     "/station/{machine}",
     "/station/{machine}/alarms/{alarm}?action=measured_by_hand",
     "/station/{machine}/tools/3/change",
+    "/station/{machine}/context",
     "/station/{machine}/sizes",
     "/alarms",
     "/alarms/{alarm}",
@@ -165,6 +166,8 @@ CONTROLS = """() => [...document.querySelectorAll(
     "button, .button, .tabs, .choice, .picker, .rail, .foot, .chart-strip, form[method=get], form[method=get] *")]
     .filter((each) => each.checkVisibility() && !each.matches(".sorts, .why > button")).map((each) => each.outerHTML.slice(0, 120))"""
 MOST_SHEETS = 24  # of a page of this house
+BOOKS = {"/api/docs"}
+"""Pages that print all that is folded in, hundreds of sheets: who prints one wants the book."""
 
 
 @pytest.mark.parametrize(
@@ -190,7 +193,7 @@ def test_a_page_prints_without_controls_and_with_whole_words(
             broken[way] = lines[letters.index("xxxx") - 1 :][:20]
     complaints.clear()
     assert (controls, broken) == ([], {})
-    assert max(sheets.values()) <= MOST_SHEETS, sheets
+    assert address in BOOKS or max(sheets.values()) <= MOST_SHEETS, sheets
 
 
 @pytest.mark.parametrize("size", SIZES)

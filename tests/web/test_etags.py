@@ -117,6 +117,11 @@ EDITS: dict[str, Callable[[Shop, int], Edit]] = {
         {"every": 4 + n} | WHY,
     ),
     "PUT /reactions/plans/{plan}": _reaction,
+    "PUT /characteristics/{characteristic}/expansion": lambda shop, n: (
+        f"/characteristics/{shop.characteristic}/expansion",
+        {"coefficient": 11.0 + n} | WHY,
+    ),
+    "PUT /machines/{machine}/context": lambda shop, n: (f"/machines/{shop.machine}/context", {"order": f"47{n}"}),
 }
 
 
