@@ -254,7 +254,7 @@ class TestProgram:
         installed.stop()
         installed.restart()
         assert shop.admin.get(what).status_code == 200
-        assert compiled_in(installed.data_dir) == kept
+        assert kept.items() <= compiled_in(installed.data_dir).items(), "more are compiled in the background"
 
     def test_an_older_program_leaves_the_database_of_a_newer_one_alone(
         self, installed: Installed, programs: Path, tmp_path: Path

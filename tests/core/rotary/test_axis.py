@@ -145,7 +145,9 @@ class TestRecovered:
             for name, true in zip(ERRORS["C"], TRUE, strict=True):
                 inside[name] += abs(found.errors[name].value - true) <= (found.half_width(name) or 0.0)
         for name, hits in inside.items():
-            assert hits / runs == pytest.approx(0.95, abs=by_chance(0.95, runs)), name
+            # Four touches leave nothing over that would say how well they touch: all coordinates count as sure as the least.
+            most = 0.99 if around == 3 else 0.95
+            assert 0.95 - by_chance(0.95, runs) <= hits / runs <= most + by_chance(most, runs), name
 
     def test_exact_touches_weigh_nothing(self) -> None:
         """The scatter is not that of the points then, so every coordinate is as sure as the others."""
