@@ -2,6 +2,7 @@
 
 import asyncio
 import gc
+import logging
 from collections.abc import AsyncIterator, Callable
 from contextlib import asynccontextmanager
 from functools import partial
@@ -157,6 +158,8 @@ from app.web.problems import add_problem_handlers
 from app.web.request_log import RequestLog
 from app.web.security import SecurityHeaders
 from app.web.templates import assets, environment
+
+log = logging.getLogger(__name__)
 
 # Each part of the shop floor brings its JSON routes (api) and its pages.
 ROUTERS: tuple[APIRouter, ...] = (
@@ -352,10 +355,13 @@ async def _nobody(_request: Request) -> None:
 
 def _compile_now(ends: Event) -> None:
     """Compile what the readings door needs, and then what pages need, so that nobody waits for the compiler."""
-    columnar.compile_now()
-    for _ in compile_each():
-        if ends.is_set():
-            return
+    try:
+        columnar.compile_now()
+        for _ in compile_each():
+            if ends.is_set():
+                return
+    except Exception:  # a loop that is needed is compiled then, and its caller gets the error
+        log.exception("loops could not be compiled at the start")
 
 
 @asynccontextmanager
