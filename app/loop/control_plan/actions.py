@@ -35,6 +35,7 @@ def set_plan(session: Session, key: str, given: ControlPlanIn, caller: Caller) -
     row = queries.plan_of(session, current)
     before, after = queries.stated(row), given.plan
     if row is not None and before == after:
+        state.planned = queries.any_counts_parts(session, machine.id)
         return row
     if row is None:
         row = ControlPlan(machine_id=machine.id, characteristic_id=characteristic.id)
@@ -175,7 +176,8 @@ def _missed(row: ControlPlan, after: int, verdict: Judged, ran: Ran) -> MissedMe
 
 
 def _known(missed: MissedMeasurement, ran: Ran) -> None:
-    missed.parts, missed.minutes, missed.shifts = ran.parts, ran.minutes, ran.shifts
+    # Minutes that a control reported do not count any more once another part is measured; those of the record stay.
+    missed.parts, missed.minutes, missed.shifts = ran.parts, max(ran.minutes, missed.minutes or 0.0), ran.shifts
 
 
 def _raise(session: Session, found: Look, machine: str, characteristic: str) -> None:

@@ -14,6 +14,9 @@ from tests.shop import Person, Shop
 
 WHY = "Agreed with quality"
 
+HELD_LONG = """UPDATE control_plan SET since = now() - interval '2 days'
+    WHERE machine_id = (SELECT id FROM machine WHERE key = %s)"""
+
 
 @pytest.fixture
 def other(shop: Shop) -> str:
@@ -154,7 +157,7 @@ def test_what_happens_to_the_tool_counts_by_its_time(shop: Shop, other: str) -> 
 def test_a_reading_that_comes_late_is_neither_the_newest_nor_the_end_of_a_gap(shop: Shop, other: str) -> None:
     plan(shop, every=1)
     with psycopg.connect(shop.server.database.dsn) as connection:
-        connection.execute("UPDATE control_plan SET since = now() - interval '2 days'")
+        connection.execute(HELD_LONG, (shop.machine,))
     begin = datetime.now(UTC) - timedelta(hours=1)
 
     def at(*minutes: int) -> list[str]:
@@ -182,7 +185,7 @@ def test_numbers_from_before_the_plan_are_not_missed(shop: Shop, other: str) -> 
 def test_by_minutes_and_by_shift_while_the_part_is_made(shop: Shop, other: str) -> None:
     plan(shop, minutes=20.0)
     with psycopg.connect(shop.server.database.dsn) as connection:  # it holds since yesterday
-        connection.execute("UPDATE control_plan SET since = now() - interval '2 days'")
+        connection.execute(HELD_LONG, (shop.machine,))
     noon = datetime.now(UTC) - timedelta(hours=26)
     shop.read(0.1, measured_at=noon.isoformat())
     moments = [(noon + timedelta(minutes=10 * at)).isoformat() for at in (1, 2)]
@@ -195,7 +198,7 @@ def test_by_minutes_and_by_shift_while_the_part_is_made(shop: Shop, other: str) 
     assert look(shop) == [], "another plan ends it"
     assert missed(shop)[0]["until"] is None
     with psycopg.connect(shop.server.database.dsn) as connection:
-        connection.execute("UPDATE control_plan SET since = now() - interval '2 days'")
+        connection.execute(HELD_LONG, (shop.machine,))
     shop.read(0.1, other, measured_at=(noon + timedelta(hours=9)).isoformat())  # at least one shift on, and over
     assert "shift" in look(shop)[0]["text"]
 
@@ -205,7 +208,7 @@ def test_a_characteristic_alone_is_overdue_by_the_minutes_that_the_control_repor
     now = datetime.now(UTC)
     ran = "INSERT INTO machine_run SELECT id, %s, %s FROM machine WHERE key = %s"
     with psycopg.connect(shop.server.database.dsn) as connection:
-        connection.execute("UPDATE control_plan SET since = now() - interval '2 days'")
+        connection.execute(HELD_LONG, (shop.machine,))
         for begin, until in ((90, 45), (40, 35)):  # min ago; it ran before the reading too
             times = [now - timedelta(minutes=each) for each in (begin, until)]
             connection.execute(ran, (*times, shop.machine))
