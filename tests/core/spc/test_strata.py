@@ -74,3 +74,35 @@ def test_groups_of_strata_that_never_met_are_tested_but_not_measured_against_eac
     found = differ(rng.normal(0, 1, 200) + 5 * (labels == 3), labels)
     assert isinstance(found, Difference)
     assert (found.test.significant, found.test.freedom, found.apart) == (True, 2, None)
+
+
+@pytest.mark.parametrize("nests", [2, 3, 5, 10])
+@pytest.mark.parametrize("wear", [0.05, 0.1])
+def test_nests_in_turn_are_not_blamed_for_the_wear_from_one_to_the_next(nests: int, wear: float) -> None:
+    """A pallet: the last nest is always cut later than the first, and the tool is changed before a pallet."""
+    rng, part = np.random.default_rng(13), np.arange(3_000)
+    found = [differ(rng.normal(0, 1, 3_000) + wear * (part % 100), part % nests) for _study in range(12)]
+    assert {(each.test.freedom, each.strata) for each in found if isinstance(each, Difference)} == {(nests - 1, nests)}
+    assert sum(each.test.significant for each in found if isinstance(each, Difference)) <= 1
+
+
+def test_nests_that_lie_in_a_slope_are_found_while_the_tool_wears() -> None:
+    part = np.arange(2_000)
+    found = differ(np.random.default_rng(15).normal(0, 1, 2_000) + 0.1 * (part % 10) - 0.03 * (part % 300), part % 10)
+    assert isinstance(found, Difference)
+    assert found.test.significant
+    assert found.apart == pytest.approx(0.9, abs=0.4)
+
+
+@pytest.mark.parametrize("strata", [2, 3, 5, 8])
+def test_of_many_readings_no_direction_is_counted_twice(strata: int) -> None:
+    rng = np.random.default_rng(17)
+    found = differ(rng.normal(0, 1, 20_000), rng.integers(0, strata, 20_000))
+    assert isinstance(found, Difference)
+    assert (found.test.freedom, found.apart is None) == (strata - 1, False)
+
+
+def test_readings_far_apart_are_no_neighbours_though_those_between_say_nothing() -> None:
+    rng, labels = np.random.default_rng(19), np.full(5_000, -1)
+    labels[::50] = rng.integers(0, 2, 100)
+    assert differ(rng.normal(0, 1, 5_000) + 0.01 * (np.arange(5_000) % 700), labels) is NoAnswer.APART
