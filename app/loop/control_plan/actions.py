@@ -121,12 +121,14 @@ def keep_context(session: Session, machine_id: int, characteristic_id: int) -> N
     It ends with readings of which none lacks anything. The machine is locked only where there is an alarm.
     """
     row = session.get_one(ControlPlan, (machine_id, characteristic_id), populate_existing=True)
-    present_context.fill(session, machine_id)
     lacking = queries.lacking(session, row, row.context_seen)
     if lacking.newest <= row.context_seen:
         return
     if lacking.fields or alarms.is_active(session, machine_id, characteristic_id, CONTEXT_MISSING):
-        lock_machines(session, [machine_id])
+        lock_machines(
+            session, [machine_id]
+        )  # no reading comes in any more: those that are there get what the machine works at
+        present_context.fill(session, machine_id)
         row = session.get_one(ControlPlan, (machine_id, characteristic_id), populate_existing=True)
         lacking = queries.lacking(session, row, row.context_seen)
     machine, characteristic = (

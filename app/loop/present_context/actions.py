@@ -1,10 +1,9 @@
 """Setting what a machine works at, and putting it on its readings that bring no context.
 
-A reading's context is written once and never changed. So only a reading without any gets one, from a periodic job: the door for
+A reading's context is written once and never changed. So only a reading without any gets one that was measured while it held, from a periodic job: the door for
 readings knows nothing of it.
 """
 
-import json
 from datetime import UTC, datetime, timedelta
 
 from sqlalchemy import select, text
@@ -27,12 +26,15 @@ UNDER_WAY = timedelta(minutes=2)
 
 _FILL = text("""
 INSERT INTO reading_context (machine_id, characteristic_id, sequence, context)
-SELECT r.machine_id, r.characteristic_id, r.sequence, CAST(:context AS jsonb) FROM reading r
-WHERE r.machine_id = :machine AND r.received_at >= :since AND r.code <> :imported AND NOT EXISTS (
+SELECT r.machine_id, r.characteristic_id, r.sequence, p.context FROM present_context p
+JOIN reading r ON r.machine_id = p.machine_id AND r.received_at >= p.filled
+WHERE p.machine_id = :machine AND p.context <> '{}' AND r.measured_at >= p.since AND r.code <> :imported AND NOT EXISTS (
     SELECT FROM reading_context c WHERE c.machine_id = r.machine_id AND c.characteristic_id = r.characteristic_id
         AND c.sequence = r.sequence)
 ON CONFLICT DO NOTHING
 """)
+
+_FILLED = text("UPDATE present_context SET filled = greatest(filled, :until) WHERE machine_id = :machine")
 
 
 def set_present(session: Session, key: str, given: PresentContextIn, caller: Caller) -> PresentContext:
@@ -56,15 +58,14 @@ def set_present(session: Session, key: str, given: PresentContextIn, caller: Cal
 
 
 def fill(session: Session, machine_id: int) -> None:
-    """Put the present context on the readings that came since it was set and have none. Done again it changes nothing."""
-    row = present_of(session, machine_id)
-    if row is None or not row.context:
-        return
-    now = datetime.now(UTC)
-    where = {"machine": machine_id, "since": row.filled, "imported": Code.IMPORTED.value}
-    session.execute(_FILL, where | {"context": json.dumps(row.context)})
-    row.filled = max(row.filled, now - UNDER_WAY)
-    session.flush()
+    """Put the present context on the readings that were measured since it was set and have none. Done again it changes nothing.
+
+    What a bridge kept through an outage was measured before, at a work that nobody knows any more: it gets none. The context is
+    read by the statement that finds the readings, so that a new one is never put on the readings of the old one, or the other way.
+    """
+    until = datetime.now(UTC) - UNDER_WAY
+    session.execute(_FILL, {"machine": machine_id, "imported": Code.IMPORTED.value})
+    session.execute(_FILLED, {"machine": machine_id, "until": until})
 
 
 def due(session: Session) -> list[Unit]:

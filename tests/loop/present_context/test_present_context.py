@@ -1,5 +1,6 @@
 """What a machine works at is put on its readings that bring no context, and on no others."""
 
+from datetime import UTC, datetime, timedelta
 from typing import Any
 
 from app.jobs.actions import run_jobs
@@ -73,3 +74,14 @@ def test_it_is_scanned_at_the_station(shop: Shop, operator: Person) -> None:
     assert 'value="A-77"' in operator.open(path)
     assert operator.send(path, 422, nest="three").count("aria-invalid") == 1
     assert shop.call("GET", f"/machines/{shop.machine}/context")["context"]["nest"] == 3
+
+
+def test_what_was_measured_before_and_comes_late_does_not_get_the_work_of_now(shop: Shop) -> None:
+    """A bridge has kept it through an outage; a reading's context is never changed."""
+    works_at(shop, order="A-1")
+    measured_at = datetime.now(UTC).isoformat()
+    works_at(shop, order="A-2")
+    shop.read(0.1, measured_at=measured_at)
+    shop.read(0.2, measured_at=(datetime.now(UTC) - timedelta(hours=3)).isoformat())
+    shop.read(0.3, measured_at=datetime.now(UTC).isoformat())
+    assert [said(shop, sequence) for sequence in (1, 2, 3)] == [{}, {}, {"order": "A-2"}]
