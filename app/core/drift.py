@@ -27,6 +27,8 @@ WARM_UP = 20  # parts after a pause
 SHORTEST_PAUSE, OF_USUAL = 10.0, 3.0
 """A pause lasts at least this many minutes, and this many times as long as two readings are apart as a rule."""
 
+NEXT = 5  # readings: the clock of one that is later than most of these ran ahead
+
 Flags = NDArray[np.bool_]
 Whole = NDArray[np.int64]
 
@@ -68,11 +70,12 @@ def usual_pause(minutes: Floats) -> float:
 def since_pause(sequence: Whole, minutes: Floats, pause: float, warm_up: int = WARM_UP) -> tuple[Floats, int]:
     """Parts since the last pause, at most `warm_up`, and the number of pauses. Before the first pause the machine is warm.
 
-    A machine's very first part comes after one. A reading that came late is no pause.
+    A machine's very first part comes after one. A reading that came late is no pause, and one whose clock ran ahead hides none.
 
     >>> since_pause(np.arange(5, 10), np.array([0.0, 1.0, 60.0, 61.0, 62.0]), 10.0, 20)[0].tolist()
     [20.0, 20.0, 0.0, 1.0, 2.0]
     """
+    minutes = _not_ahead(minutes)
     latest = np.maximum.accumulate(minutes)
     begins = np.concatenate((sequence[:1] == 1, minutes[1:] - latest[:-1] >= pause))
     starts = np.flatnonzero(begins)
@@ -83,6 +86,14 @@ def since_pause(sequence: Whole, minutes: Floats, pause: float, warm_up: int = W
     return np.minimum(parts, warm_up).astype(np.float64), len(starts)
 
 
+def _not_ahead(minutes: Floats) -> Floats:
+    """Moments, none of them later than most of the next few."""
+    if len(minutes) <= NEXT:
+        return minutes
+    following = np.median(np.lib.stride_tricks.sliding_window_view(minutes[1:], NEXT), axis=1)
+    return np.concatenate((np.minimum(minutes[: len(following)], following), minutes[len(following) :]))
+
+
 def drift(
     sequence: Whole,
     worn: Floats,
@@ -90,15 +101,18 @@ def drift(
     minutes: Floats,
     temperature: Floats,
     *,
+    cut: tuple[Whole, Floats] | None = None,
     pause: float | None = None,
     warm_up: int = WARM_UP,
 ) -> Drift:
     """Regress the wear curve (mm) of readings in order; edge: the stretch of each; minutes: when it was measured.
 
-    Readings without a temperature (NaN), or with one that cannot be true, count as parts and no more. Raises `Refused`.
+    cut: sequence and minutes of all parts, where some are left out: the machine went on at those. Readings without a temperature (NaN), or with one that cannot be true, count as parts and no more. Raises `Refused`.
     """
-    shortest = usual_pause(minutes) if pause is None else pause
-    parts, pauses = since_pause(sequence, minutes, shortest, warm_up)
+    numbers, moments = (sequence, minutes) if cut is None else cut
+    shortest = usual_pause(moments) if pause is None else pause
+    of_all, pauses = since_pause(numbers, moments, shortest, warm_up)
+    parts = of_all[np.searchsorted(numbers, sequence)]
     stated = ~np.isnan(temperature)
     good = stated & (temperature >= LOWEST) & (temperature <= HIGHEST)
     columns = {

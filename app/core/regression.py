@@ -7,8 +7,8 @@ in each group (Frisch and Waugh 1933, Econometrica 1, 387), so that steps betwee
 
 *Collinearity.* The variance inflation of a column is 1 / (1 - R²) with R² from regressing it on the others (Marquardt 1970,
 Technometrics 12, 591): by so much its standard error, squared, is larger than if it were alone. Beyond `INFLATED` its effect
-is hard to tell from the others'. A column that does not vary, or that those before it determine, has no effect of its own and
-is named in `left_out`; nothing is attributed to it.
+is hard to tell from the others'. A column that does not vary, or that others determine, has no effect of its own, nor have
+those that determine it: the plane is fitted all the same, but nobody can say which of them it is. They are named in `left_out`.
 
 *Scatter of neighbours that is alike.* Readings of a process drift together, so an interval from the standard error of
 independent ones is too narrow. As in `app.core.wear`, n readings count as n (1 - rho) / (1 + rho) (Santer et al. 2000). The
@@ -101,9 +101,10 @@ def regression(
     Raises `Refused` for fewer readings than leave `FEWEST` degrees of freedom, and where y does not vary.
 
     >>> x = np.arange(40.0)
-    >>> found = regression(3 * x + np.tile([0.5, -0.5], 20), {"x": x, "twice": 2 * x})
-    >>> round(found.effects["x"].value, 2), found.left_out["twice"].value
-    (3.0, 'determined')
+    >>> z = np.sin(x)
+    >>> found = regression(3 * x + z, {"x": x, "twice": 2 * x, "z": z})
+    >>> round(found.effects["z"].value, 2), found.left_out["x"].value, found.left_out["twice"].value
+    (1.0, 'determined', 'determined')
     """
     count = len(y)
     names, places = np.unique(np.zeros(count) if groups is None else groups, return_inverse=True)
@@ -114,7 +115,9 @@ def regression(
     total = float(centred @ centred)
     if not varies(sqrt(total / count), y):
         raise Refused(Reason.NO_VARIATION)
-    chosen, left_out = _independent_of_each_other({name: (x, _centred(x, places)) for name, x in columns.items()})
+    chosen, left_out, unclear = _independent_of_each_other(
+        {name: (x, _centred(x, places)) for name, x in columns.items()}
+    )
     matrix = np.column_stack([x / np.linalg.norm(x) for x in chosen.values()]) if chosen else np.empty((count, 0))
     q, r = np.linalg.qr(matrix)
     scaled = np.linalg.solve(r, q.T @ centred)
@@ -128,6 +131,8 @@ def regression(
     scatter = max(sqrt(squares / freedom), resolution_of(y).step / sqrt(12))
     effects = {}
     for at, (name, x) in enumerate(chosen.items()):
+        if name in unclear:
+            continue
         norm = float(np.linalg.norm(x))
         error = scatter * sqrt(float(inflation[at]) * loss) / norm
         share = float(scaled[at] ** 2 / inflation[at]) / total
@@ -136,7 +141,7 @@ def regression(
         readings=count,
         levels=len(names),
         effects=effects,
-        left_out=left_out,
+        left_out=left_out | dict.fromkeys(unclear, LeftOut.DETERMINED),
         r_squared=min(1.0, max(0.0, 1 - squares / total)),
         scatter=scatter,
         correlation=rho,
@@ -153,10 +158,11 @@ def _centred(x: Floats, places: NDArray[np.intp]) -> Floats:
 
 def _independent_of_each_other(
     columns: Mapping[str, tuple[Floats, Floats]],
-) -> tuple[dict[str, Floats], dict[str, LeftOut]]:
-    """Columns (as they are, and centred) that have an effect of their own, and the others with the reason."""
+) -> tuple[dict[str, Floats], dict[str, LeftOut], set[str]]:
+    """Columns (as they are, and centred) that make the plane, the others with the reason, and those of the plane that determine one."""
     chosen: dict[str, Floats] = {}
     left_out: dict[str, LeftOut] = {}
+    unclear: set[str] = set()
     for name, (raw, x) in columns.items():
         squares = float(x @ x)
         if not varies(sqrt(squares / len(x)), raw):
@@ -164,13 +170,15 @@ def _independent_of_each_other(
             continue
         before = np.column_stack(list(chosen.values())) if chosen else np.empty((len(x), 0))
         norms = np.linalg.norm(before, axis=0)
-        q, _r = np.linalg.qr(before / norms)
+        q, r = np.linalg.qr(before / norms)
         rest = x - q @ (q.T @ x)
         if float(rest @ rest) < DETERMINED * squares:
             left_out[name] = LeftOut.DETERMINED
+            parts = np.abs(np.linalg.solve(r, q.T @ x))  # by which each of those before makes it up
+            unclear |= {each for each, part in zip(chosen, parts, strict=True) if part > sqrt(DETERMINED * squares)}
         else:
             chosen[name] = x
-    return chosen, left_out
+    return chosen, left_out, unclear
 
 
 def _effect(value: float, error: float, freedom: float, inflation: float, share: float) -> Effect:

@@ -100,3 +100,32 @@ def test_parts_since_the_pause(gaps: list[float], first: int, warm_up: int) -> N
 def test_a_reading_that_came_late_is_no_pause() -> None:
     parts, pauses = since_pause(np.arange(2, 6), np.array([100.0, 101.0, 20.0, 102.0]), 10.0)
     assert (parts.tolist(), pauses) == ([20.0] * 4, 0)
+
+
+def test_parts_that_are_left_out_make_no_pause() -> None:
+    sequence, worn, edge, minutes, temperature = days(1)
+    kept = np.ones(len(sequence), np.bool_)
+    kept[240:252] = False  # faults of the probe, for 24 minutes
+    some = (sequence[kept], worn[kept], edge[kept], minutes[kept], temperature[kept])
+    assert drift(*some).pauses == 5
+    assert drift(*some, cut=(sequence, minutes)).pauses == 4
+
+
+def test_a_clock_that_ran_ahead_once_hides_no_pause() -> None:
+    sequence, worn, edge, minutes, temperature = days(2)
+    minutes[150] += 60 * 24 * 30
+    assert drift(sequence, worn, edge, minutes, temperature).pauses == 4
+
+
+def test_wear_of_a_first_run_up_is_not_taken_for_warming_up() -> None:
+    """Parts since the pause and parts are the same then: nobody can say which it is."""
+    rng, sequence = np.random.default_rng(3), np.arange(1, 21)
+    temperature = 22 + rng.normal(size=20)
+    worn = 0.0001 * sequence + 0.001 * temperature + rng.normal(size=20) * 0.0001
+    found = drift(sequence, worn, np.zeros(20, np.int64), (sequence * 2.0).astype(np.float64), temperature).regression
+    assert set(found.effects) == {Column.TEMPERATURE.value}
+    assert found.effects[Column.TEMPERATURE.value].value == pytest.approx(0.001, rel=0.2)
+    assert found.left_out == {
+        Column.SINCE_PAUSE.value: LeftOut.DETERMINED,
+        Column.WEAR.value: LeftOut.DETERMINED,
+    }

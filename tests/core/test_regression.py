@@ -106,9 +106,11 @@ def test_intervals_hold_although_neighbours_are_alike() -> None:
 def test_what_cannot_be_told_apart_gets_no_effect() -> None:
     rng = np.random.default_rng(1)
     x = rng.normal(size=60)
-    found = regression(x + rng.normal(size=60), {"x": x, "same": 3 * x - 2, "still": np.full(60, 21.5)})
-    assert found.left_out == {"same": LeftOut.DETERMINED, "still": LeftOut.CONSTANT}
-    assert list(found.effects) == ["x"]
+    other = rng.normal(size=60)
+    columns = {"x": x, "other": other, "same": 3 * x - 2, "still": np.full(60, 21.5)}
+    found = regression(x + 0.5 * other + rng.normal(size=60), columns)
+    assert found.left_out == {"x": LeftOut.DETERMINED, "same": LeftOut.DETERMINED, "still": LeftOut.CONSTANT}
+    assert list(found.effects) == ["other"], "nobody can say if it is x or the same"
     nearly = regression(x + rng.normal(size=60), {"x": x, "nearly": x + rng.normal(size=60) / 100})
     assert all(effect.inflated and not effect.significant for effect in nearly.effects.values())
     assert nearly.r_squared > 0.3, "together they explain, apart neither is said to"

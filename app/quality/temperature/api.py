@@ -21,7 +21,7 @@ router = api_router("statistics", FROM_REPLICA)
 Last = Annotated[int, Query(ge=2, le=queries.MOST, description="The newest readings.")]
 Of = Annotated[
     Literal["part", "machine"] | None,
-    Query(description="Whose temperature; left out: the part's, or the machine's where no part has one."),
+    Query(description="Whose temperature; left out: the part's, or the machine's where that is known more often."),
 ]
 Pause = Annotated[
     float | None,

@@ -77,4 +77,4 @@ def _page(
 
 def _as_typed(expansion: Expansion) -> dict[str, str]:
     stated = {name: getattr(expansion, name) for name in Expansion.__dataclass_fields__}
-    return {name: f"{value:g}" for name, value in stated.items() if value is not None}
+    return {name: repr(value).removesuffix(".0") for name, value in stated.items() if value is not None}

@@ -9,7 +9,7 @@ from sqlalchemy.orm import Session
 from app.core.drift import WARM_UP, Drift, drift
 from app.core.spc.quantity import Quantity
 from app.core.spc.refusal import Floats, Refused
-from app.core.temperature import PER_KELVIN, Expansion
+from app.core.temperature import HIGHEST, LOWEST, PER_KELVIN, Expansion
 from app.loop.characteristics.queries import CurrentCharacteristic
 from app.loop.expansion.queries import expansion_of, temperatures_between
 from app.loop.summaries import queries as statistics
@@ -24,15 +24,18 @@ Body = Literal["part", "machine"]
 class Study(NamedTuple):
     """Readings and their drift; `refused` where they carry none.
 
-    of: whose temperature it is. readings, stated: that count, and those of them with a temperature. rebuilt: with the corrections
+    of: whose temperature it is; both: part and machine have some. readings, stated: that count, and those of them with a
+    temperature. unknown: left out, for nobody knows with which corrections their part was cut. rebuilt: with the corrections
     taken out; of readings whose corrections nobody knows sizes are as they came out. expected: by the expansion alone, mm/K.
     """
 
     current: CurrentCharacteristic
     expansion: Expansion
     of: Body
+    both: bool
     readings: int
     stated: int
+    unknown: int
     rebuilt: bool
     warm_up: int
     expected: float | None
@@ -48,7 +51,7 @@ def study_of(
     pause: float | None = None,
     warm_up: int = WARM_UP,
 ) -> Study:
-    """Regress the newest readings. of: whose temperature; None: the part's, or the machine's where no part has one.
+    """Regress the newest readings. of: whose temperature; None: the part's, or the machine's where that is believed more often.
 
     pause: minutes without a reading that are one; None: by the distance of the readings. warm_up: parts that a machine needs.
     """
@@ -56,17 +59,20 @@ def study_of(
     found, rebuilt = _readings(session, current, window)
     temperatures = _temperatures(session, current, window, found.series.sequence)
     stated = {body: int((~np.isnan(values)).sum()) for body, values in temperatures.items()}
-    chosen: Body = of or ("part" if stated["part"] or not stated["machine"] else "machine")
+    good = {body: int(((values >= LOWEST) & (values <= HIGHEST)).sum()) for body, values in temperatures.items()}
+    chosen: Body = of or ("part" if good["part"] >= good["machine"] else "machine")
     expansion = expansion_of(session, current.machine.id, current.characteristic.id)
-    minutes = (found.measured_at - found.measured_at[:1]) / np.timedelta64(1, "m")
+    parts = statistics.history_of(session, current.characteristic, window, ["measured_at"])
+    begin, minute = parts["measured_at"][:1], np.timedelta64(1, "m")
     result: Drift | Refused
     try:
         result = drift(
             found.series.sequence,
             found.series.values,
             found.series.edge,
-            minutes,
+            (found.measured_at - begin) / minute,
             temperatures[chosen],
+            cut=(parts["sequence"], (parts["measured_at"] - begin) / minute),
             pause=pause,
             warm_up=warm_up,
         )
@@ -76,8 +82,10 @@ def study_of(
         current,
         expansion,
         chosen,
+        all(stated.values()),
         len(found.series),
         stated[chosen],
+        len(found.left_out.unknown) if rebuilt else 0,
         rebuilt,
         warm_up,
         _expected(expansion, chosen, current.parameters.target),

@@ -50,6 +50,15 @@ def too_few(refused: Refused) -> str:
     return refusal(refused)
 
 
+def unknown(count: int) -> str:
+    """The number of readings that are left out because their corrections are not known."""
+    return ngettext(
+        "%(num)s reading is left out: nobody knows with which corrections its part was cut.",
+        "%(num)s readings are left out: nobody knows with which corrections their parts were cut.",
+        count,
+    ) % {"num": count}
+
+
 def sentences(study: Study, drift: Drift) -> list[str]:
     """The result, and how far it can be trusted."""
     found = drift.regression
@@ -124,6 +133,8 @@ def _doubts(study: Study, drift: Drift) -> list[str]:
             )
             % {"num": drift.unbelieved, "low": short(LOWEST), "high": short(HIGHEST)}
         )
+    if study.unknown:
+        said.append(unknown(study.unknown))
     if not study.rebuilt:
         said.append(_("Nobody knows which corrections these parts were cut with: sizes are taken as they came out."))
     said.append(_("What changes together need not be cause and effect."))
