@@ -1,5 +1,6 @@
 """Fields of readings as others write them, in files, lines and messages; as ``POST /readings`` takes them."""
 
+import re
 from math import isfinite
 from typing import Any, Final, NamedTuple
 from zoneinfo import ZoneInfo
@@ -28,6 +29,7 @@ TEMPERATURES: Final = FIELDS[-2:]
 """Fields of the context, °C. What is no number is left out: no reading is lost to a sensor."""
 HIGHEST_NUMBER: Final = 2_147_483_647
 LONGEST_TEXT: Final = 128
+_CELSIUS: Final = re.compile(r"\s*[°º]?C$")
 
 
 class Form(NamedTuple):
@@ -53,6 +55,8 @@ class Form(NamedTuple):
     def value(self, field: str, value: Any) -> Any:
         """The value of a field but ``characteristic``; None of a time or a temperature that is none. Raises `Unreadable`, whose words go behind the value."""
         text = str(value).strip()
+        if field in TEMPERATURES:
+            return self._degrees(text)
         if self.sheet:
             spreadsheet.refuse_error(text)
         if field == "measured":
@@ -64,8 +68,6 @@ class Form(NamedTuple):
             if not isfinite(size * scale):
                 raise Unreadable("is not a number")
             return round(size * scale, 9)
-        if field in TEMPERATURES:
-            return self._degrees(text)
         if field in {"measured_at", "machined_at"}:
             at = self.together.moment(text, self.zone, self.times)
             return None if at is None else at.isoformat()
@@ -78,6 +80,7 @@ class Form(NamedTuple):
         return text
 
     def _degrees(self, text: str) -> float | None:
+        text = _CELSIUS.sub("", text)
         try:
             degrees = number(text, self._decimal_in(text))
         except Unreadable:

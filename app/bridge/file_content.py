@@ -19,7 +19,7 @@ from typing import Any, Final, Literal, NamedTuple
 from msgspec import Struct
 
 from app.bridge.configuration import Machine, Positive
-from app.bridge.fields import EVERY, FIELDS, Form, put
+from app.bridge.fields import EVERY, FIELDS, TEMPERATURES, Form, put
 from app.bridge.file_rows import Fault, Found, Table, cell_of, csv_rows, has, ndjson_rows, reasons, units_of
 from app.bridge.links import Received
 from app.bridge.patterns import LONGEST_LINE, Patterns, TooSlow, check_expressions
@@ -33,7 +33,7 @@ from app.files.formats.aqdef_times import WallClock, day_order, time_of
 from app.files.formats.cell_values import Slashed, Unreadable, same_number, slashed, zone_named
 from app.files.formats.file_times import times_of
 from app.files.formats.repeats import Repeats
-from app.files.formats.units import LENGTHS, UnknownUnit, beside, length_unit, unit_in
+from app.files.formats.units import LENGTHS, UnknownUnit, beside, in_celsius, length_unit, unit_in
 
 NAMES: Final = {"csv": "*.csv", "xlsx": "*.xls[xm]", "ndjson": "*.ndjson", "text": "*.txt", "aqdef": "*.df[qdxQDX]"}
 NOT_ALONE: Final = 2  # files of a pair
@@ -271,6 +271,12 @@ class _Reader:
                 self._remark(row)
                 continue
             fields = {name: cell_of(row, column) for name, column in columns.items() if has(row, column)}
+            for name in fields.keys() & set(TEMPERATURES):
+                if not in_celsius(columns[name]):
+                    del fields[name]
+                    if columns[name] not in units:
+                        units[columns[name]] = None
+                        self._remark(aqdef.Remark(line, columns[name], "", "names another scale than °C; left out"))
             if "unit" not in self.settings.columns:
                 fields["unit"] = beside(row, "unit")
             sizes = (

@@ -7,6 +7,7 @@ import pytest
 
 from app.bridge.fields import Form
 from app.bridge.messages import Found, foreign_readings, own_reading
+from app.files.formats.cell_values import Unreadable
 
 NAMES = {"d40": "shaft-1", "d20": "bore-1", "1": "shaft-1", "*": "shaft-1"}
 FORM = Form(1.0)
@@ -84,9 +85,17 @@ def test_what_is_no_reading_is_said(content: object, fields: dict[str, str], wor
 
 
 @pytest.mark.parametrize(
-    ("sent", "context"), [(24.5, {"part_temperature": 24.5}), ("24.5", {"part_temperature": 24.5}), ("----", None)]
+    ("sent", "context"),
+    [(sent, {"part_temperature": 24.5}) for sent in (24.5, "24.5", "24.5 °C", "24.5C")]
+    + [(sent, None) for sent in ("----", "76.1 °F", "", None)],
 )
 def test_a_temperature_is_a_circumstance_and_costs_no_reading(sent: object, context: object) -> None:
     [found] = foreign({"v": 40.0, "id": 12, "t": sent}, {"measured": "v", "key": "id", "part_temperature": "t"})
     assert found.fault is None
     assert found.body.get("context") == context
+
+
+def test_a_cell_of_a_sensor_that_failed_costs_no_reading() -> None:
+    assert Form(1.0, sheet=True).value("part_temperature", "#N/A") is None
+    with pytest.raises(Unreadable):
+        Form(1.0, sheet=True).value("measured", "#N/A")

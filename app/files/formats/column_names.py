@@ -10,6 +10,8 @@ LOWER_LIMITS = (
 )  # fmt: skip
 """Names of columns that hold a limit as a size; *upper* and *lower* by any other name are deviations from the nominal size."""
 
+TEMPERATURES = ("part_temperature", "machine_temperature")
+"""Columns that are circumstances of a reading, °C."""
 # Folded: lower case, no accents, no unit. The first of a line is the field's own name.
 NAMES: dict[str, tuple[str, ...]] = {
     "measured": (

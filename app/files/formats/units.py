@@ -6,7 +6,7 @@ from functools import lru_cache
 from typing import Any, Final, Literal, get_args
 
 from app.files.formats.cell_values import Unreadable, folded
-from app.files.formats.column_names import NAMES
+from app.files.formats.column_names import NAMES, TEMPERATURES
 from app.language.i18n import _
 
 Unit = Literal["mm", "um", "nm", "cm", "m", "inch", "mil", "tenth", "uin"]
@@ -45,6 +45,8 @@ _BRACKETS: Final = re.compile(r"\[([^\[\]]*)\]|\(([^()]*)\)|<([^<>]*)>")
 _BEHIND: Final = re.compile(r"(.*\d[.,]?)\s*([^\d\s.,]{1,12})")
 LONGEST_SIZE: Final = 400  # characters; what is longer is no size
 _LARGEST: Final = 1e300  # what is larger would become infinite
+_LAST_WORD: Final = re.compile(r"[_ ]([^_ ]+)$")
+_OTHER_SCALES: Final = {"f", "fahrenheit", "k", "kelvin", "r", "rankine", "℉"}
 _AT_END: Final = re.compile(r"[_ ](mm|MM|[uµμ]m|inch)$")
 _NO_UNITS: Final = (
     {*"xyzabcuvwijkrdln", "id", "max", "min", "avg", "mean", "med", "std", "ist", "soll", "act", "nom", "dia", "abs", "rel"}
@@ -63,6 +65,27 @@ def length_unit(word: str) -> str | None:
     folded = word.lower()
     as_written = _ONLY_AS_WRITTEN.get(folded)
     return None if as_written is not None and word not in as_written else _WORDS.get(folded)
+
+
+def in_celsius(header: str) -> bool:
+    """Tell if nothing in the name of a column of temperatures names another scale than °C.
+
+    >>> in_celsius("Part temperature"), in_celsius("Teiltemperatur [°C]"), in_celsius("temp (probe 1)")
+    (True, True, True)
+    >>> in_celsius("Part temperature [°F]"), in_celsius("Teiltemperatur (K)"), in_celsius("part_temp_F")
+    (False, False, False)
+    """
+    words = [word for each in _BRACKETS.findall(header) for word in each if word] or _LAST_WORD.findall(header)
+    return not any(word.strip().lower().lstrip("°º").removeprefix("deg").strip() in _OTHER_SCALES for word in words)
+
+
+def in_another_scale(header: Sequence[str], field: str, places: Sequence[int]) -> bool:
+    """Tell if these columns would be a temperature whose names say another scale than °C.
+
+    >>> in_another_scale(["measured", "Part temperature [°F]"], "part_temperature", [1])
+    True
+    """
+    return field in TEMPERATURES and not all(in_celsius(header[place]) for place in places)
 
 
 class UnknownUnit(Exception):

@@ -25,6 +25,18 @@ def test_columns_of_a_table_are_circumstances(shop: Shop) -> None:
     assert "Teiltemperatur" in str(shop.call("POST", "/readings/table", 422, **wrong))
 
 
+@pytest.mark.parametrize("scale", ["[°F]", "(K)", "_F"])
+def test_a_column_in_another_scale_is_never_taken_for_degrees_celsius(shop: Shop, scale: str) -> None:
+    column = TABLE.replace(" [°C]", f" {scale}".replace(" _", "_"))
+    about: dict[str, Any] = {"name": "a.csv", "content": column, "characteristic": shop.characteristic}
+    done = shop.call("POST", "/readings/table", **about)
+    assert (done["stored"], len(done["ignored"])) == (2, 1)
+    assert (shop.call("GET", f"/readings/{shop.characteristic}/1")["context"] or {}).get("part_temperature") is None
+    name = column.partition("\n")[0].split(";")[2]
+    wrong = shop.call("POST", "/readings/table", 422, **about, map={"part_temperature": name})
+    assert "another scale" in str(wrong)
+
+
 def test_exports_have_both_sizes(shop: Shop) -> None:
     shop.call("PUT", f"/characteristics/{shop.characteristic}/expansion", **STEEL)
     shop.read(1.0, context={"part_temperature": 24.0, "machine_temperature": 22.0})

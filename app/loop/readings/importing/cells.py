@@ -15,10 +15,21 @@ from zoneinfo import ZoneInfo
 
 from app.files.formats import cell_values, delimited, spreadsheet
 from app.files.formats.cell_values import Unreadable, same_number
+from app.files.formats.column_names import TEMPERATURES
 from app.files.formats.delimited import Row, Unusable
 from app.files.formats.units import agreed, in_mm, unit_behind
 from app.language.i18n import _
-from app.loop.readings.importing.layout import DRAWN, NO_DIGIT, ORIGIN, Layout, Wishes, look, named_in, rows_of, written
+from app.loop.readings.importing.layout import (
+    DRAWN,
+    NO_DIGIT,
+    ORIGIN,
+    Layout,
+    Wishes,
+    look,
+    named_in,
+    rows_of,
+    written,
+)
 from app.loop.readings.origin import Origin
 
 MOST_FLAWS = 200
@@ -27,8 +38,6 @@ SHOWN_LINES = 12
 SHOWN_CELL = 40
 AT_ONCE = 20_000  # items in memory before they are put down
 _OF_CHARACTERISTIC = {"characteristic", *DRAWN}
-TEMPERATURES = ("part_temperature", "machine_temperature")
-"""Columns that are circumstances of a reading, °C."""
 
 
 class Flaw(NamedTuple):

@@ -16,7 +16,7 @@ from app.files.formats.column_names import NAMES
 from app.files.formats.delimited import Row, Unusable
 from app.files.formats.file_times import FileTimes, times_of
 from app.files.formats.headings import TOP, as_wide, heading, others
-from app.files.formats.units import LENGTHS, UnknownUnit, unit_above, unit_behind, unit_in
+from app.files.formats.units import LENGTHS, UnknownUnit, in_another_scale, unit_above, unit_behind, unit_in
 from app.language.i18n import _
 from app.loop.readings.origin import COLUMNS
 
@@ -432,8 +432,12 @@ def _columns(header: tuple[str, ...], mapping: Mapping[str, str]) -> dict[str, t
         elif column:  # an empty one says: not in this file
             places = _places(header, column)
             if places is None:
-                message = _("There is no column {column}; the file has: {header}.").format(
-                    column=repr(column), header=", ".join(header)
+                message = _("There is no column {column}; the file has: {header}.")
+                message = message.format(column=repr(column), header=", ".join(header))
+                problems.append(FieldError(f"map {name}", message))
+            elif in_another_scale(header, name, places):
+                message = _("The column {column} names another scale; temperatures are in °C.").format(
+                    column=repr(column)
                 )
                 problems.append(FieldError(f"map {name}", message))
             else:
@@ -441,7 +445,7 @@ def _columns(header: tuple[str, ...], mapping: Mapping[str, str]) -> dict[str, t
     if problems:
         raise Invalid(problems[0].message, _("Nothing was imported."), errors=problems)
     used_places = {place for places in columns.values() for place in places}
-    guesses = _guesses(header).items()
+    guesses = [guess for guess in _guesses(header).items() if not in_another_scale(header, *guess)]
     columns |= {name: guess for name, guess in guesses if name not in mapping and not used_places & set(guess)}
     if "characteristic" in columns:
         return columns
