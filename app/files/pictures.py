@@ -66,6 +66,8 @@ def drawn_again(content: bytes) -> Picture:
             as_png = opened.format == "PNG"
             opened.draft("RGB", (LONGEST_SIDE, LONGEST_SIDE))  # a JPEG is read no finer than it is kept
             image = ImageOps.exif_transpose(opened)
+            if image.mode.startswith("I"):  # 16 bits of grey, which `convert` cuts off at 255
+                image = image.point(lambda grey: grey / 256).convert("L")
             image = image.convert("RGBA" if image.has_transparency_data else "RGB")
     except (OSError, SyntaxError) as error:
         raise Unusable(_("This picture cannot be read; it may be cut off: {error}.").format(error=error)) from None

@@ -6,6 +6,7 @@ def add(..., given: PictureIn): picture_of(decoded(given.content))
 """
 
 from base64 import b64decode
+from collections.abc import Sequence
 from datetime import datetime
 from typing import Annotated, Any, NamedTuple, Protocol
 
@@ -123,6 +124,16 @@ def picture_of(content: bytes, field: str = "content") -> Picture:
         return apart(drawn_again, content, limits=LIMITS, remedy="")
     except Unusable as error:
         raise Invalid.at(field, str(error).rstrip("."), do=kinds) from None
+
+
+def pictures_of(files: Sequence[SentFile], most: int, field: str | None = None) -> list[tuple[str, Picture]]:
+    """The pictures of a form with the field of each; `field` names it in an error, else its own. Raises as `picture_of`.
+
+    Raises `Invalid` for more than `most`, before any of them is read: each takes a process.
+    """
+    if len(files) > most:
+        raise Invalid.at(field or files[0].field, _("more than {most} pictures at once").format(most=most))
+    return [(file.field, picture_of(file.content, field or file.field)) for file in files]
 
 
 def served(request: Request, picture: Kept, cache: str) -> Response:

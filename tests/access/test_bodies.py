@@ -98,6 +98,8 @@ def test_a_bound_device_sends_forms_and_no_files(server: InProcess, shop: Shop) 
     too_much = send(server, "POST", path, MEGABYTE, FORM, cookie)
     assert too_much.status == 413
     assert too_much.read <= 64_000 + PIECE
+    for path in ("/setup/reactions/new", "/api/v1/reactions/pictures"):  # takes pictures, of engineers
+        assert send(server, "POST", path, MEGABYTE, FORM, cookie).read <= 64_000 + PIECE
 
 
 @pytest.mark.parametrize("path", ["/import", "/api/v1/readings/aqdef", "/api/v1/readings/table"])

@@ -86,6 +86,13 @@ def test_what_is_too_much_is_refused_by_its_size() -> None:
         decoded("no?")
 
 
+def test_a_picture_of_a_camera_with_16_bits_of_grey_keeps_its_shades() -> None:
+    content = BytesIO()
+    Image.frombytes("I;16", (2, 1), b"\x2c\x01\x00\x80").save(content, "PNG")  # 300 and 32768 of 65535
+    kept = opened(drawn_again(content.getvalue()).content).convert("L")
+    assert list(kept.tobytes()) == pytest.approx([1, 128], abs=4)
+
+
 def test_the_process_of_its_own_hands_it_back_or_says_why_not() -> None:
     content = picture()
     assert picture_of(content) == drawn_again(content)

@@ -20,7 +20,7 @@ from app.web.fields import Reason
 from app.web.forms import by_field
 from app.web.limits import takes
 from app.web.paging import address, part_of
-from app.web.pictures import AS_FORM, FilesDep, picture_of, sent
+from app.web.pictures import AS_FORM, FilesDep, pictures_of, sent
 from app.web.templates import page
 from app.web.validation import checked
 
@@ -146,7 +146,7 @@ def add_photos(request: Request, session: SessionDep, caller: Operator, number: 
     """Add photos, one or several; the script of the page sends each by itself and wants no page for an answer."""
     queries.alarm(session, number)
     session.commit()  # nothing is kept open while pictures are read
-    for picture in [picture_of(file.content, "photo") for file in files]:
+    for _field, picture in pictures_of(files, photo_actions.MOST_PHOTOS, "photo"):
         photo_actions.add_photo(session, number, picture, caller)
     return sent(request, f"/alarms/{number}#photos")
 

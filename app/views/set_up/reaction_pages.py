@@ -23,7 +23,7 @@ from app.views.set_up.frame import setup_page
 from app.web.deps import FormDep, SessionDep
 from app.web.forms import by_field, parsed, typed
 from app.web.limits import MEGABYTE, takes
-from app.web.pictures import FilesDep, SentFile, picture_of
+from app.web.pictures import FilesDep, SentFile, pictures_of
 
 router = APIRouter(include_in_schema=False)
 SPARE = 3  # empty steps at the end of the form
@@ -147,8 +147,10 @@ def _with_pictures(
     if not files:
         return form
     session.commit()  # nothing is kept open while pictures are read
-    read = [(file.field.removeprefix("picture-"), picture_of(file.content, file.field)) for file in files]
-    digests = {at: actions.add_picture(session, picture, caller).row.digest for at, picture in read}
+    digests = {
+        field.removeprefix("picture-"): actions.add_picture(session, picture, caller).row.digest
+        for field, picture in pictures_of(files, MOST_STEPS)
+    }
     session.commit()
     return {
         **form,

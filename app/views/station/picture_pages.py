@@ -9,7 +9,7 @@ from app.views.station.queries import alarm_of_machine
 from app.views.station.who import who
 from app.web.deps import FormDep, SessionDep
 from app.web.limits import takes
-from app.web.pictures import AS_FORM, DigestPath, FilesDep, picture_of, sent, served
+from app.web.pictures import AS_FORM, DigestPath, FilesDep, pictures_of, sent, served
 
 router = APIRouter(prefix="/station", include_in_schema=False)
 
@@ -29,6 +29,6 @@ def add_photos(
     alarm_of_machine(session, machine, number)
     caller = who(request, session, at, form)
     session.commit()  # nothing is kept open while pictures are read
-    for picture in [picture_of(file.content, "photo") for file in files]:
+    for _field, picture in pictures_of(files, photo_actions.MOST_PHOTOS, "photo"):
         photo_actions.add_photo(session, number, picture, caller)
     return sent(request, f"/station/{machine}")
