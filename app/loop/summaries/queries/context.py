@@ -20,6 +20,7 @@ Whole = NDArray[np.int64]
 LOOKED_AT = 1_000  # newest contexts, for the values that a form offers
 MOST_OFFERED = 50  # values of a field
 MOST_STRATA = 12
+MOST_NAMED = 100  # of which those are taken that the chosen readings have
 WITHOUT, OLDER = -1, -2
 """In place of the number of a stratum: the reading has none; it is one of more than `MOST_STRATA`."""
 
@@ -30,10 +31,14 @@ SELECT min(sequence), max(sequence) FROM (
         AND context @> CAST(:context AS jsonb) ORDER BY sequence DESC LIMIT :last_ones
 ) AS found
 """  # noqa: S608 - made of our own names
+# A field may say something else of every part, such as a serial number: all but the newest names are one row without a name.
 _STRATA = f"""
-SELECT context ->> :field AS name, string_agg(int8send(sequence), ''::bytea) AS sequences, max(sequence) AS newest
-FROM reading_context WHERE {_HERE} AND sequence BETWEEN :first AND :last AND context ->> :field IS NOT NULL
-GROUP BY name ORDER BY newest DESC
+WITH said AS (
+    SELECT context ->> :field AS name, sequence FROM reading_context
+    WHERE {_HERE} AND sequence BETWEEN :first AND :last AND context ->> :field IS NOT NULL
+), newest AS (SELECT name FROM said GROUP BY name ORDER BY max(sequence) DESC LIMIT {MOST_NAMED})
+SELECT newest.name, string_agg(int8send(said.sequence), ''::bytea) AS sequences, max(said.sequence) AS newest_one
+FROM said LEFT JOIN newest USING (name) GROUP BY newest.name ORDER BY newest.name IS NULL, newest_one DESC
 """  # noqa: S608 - made of our own names
 _MATCHING = f"""
 SELECT string_agg(int8send(sequence), ''::bytea) FROM reading_context
@@ -109,8 +114,9 @@ def strata_of(session: Session, characteristic: Characteristic, field: ContextFi
         at = at[sequence[np.minimum(at, len(sequence) - 1)] == numbers]
         if not len(at):
             continue
-        labels[at] = len(names) if len(names) < MOST_STRATA else OLDER
-        if len(names) < MOST_STRATA:
+        is_named = name is not None and len(names) < MOST_STRATA
+        labels[at] = len(names) if is_named else OLDER
+        if is_named:
             names.append(name)
     return Strata(names, labels)
 
