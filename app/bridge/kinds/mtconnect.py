@@ -216,8 +216,8 @@ class Context:
     def running(self) -> bool | None:
         """Tell if the control runs a program now: one of its paths does. None if the agent does not say, or has been unreachable."""
         recent = self._until is not None and datetime.now(UTC) <= self._until + self._trusted
-        told = [value for value in self._executions.values() if value is not None]
-        return "ACTIVE" in told if told and recent else None
+        states = [value for value in self._executions.values() if value is not None]
+        return "ACTIVE" in states if states and recent else None
 
     def summary(self) -> str:
         """One sentence for the heartbeat."""

@@ -33,7 +33,7 @@ MOST_BLOCKS = 2_000
 """Of more blocks this many, evenly spread: with more of them what does not matter becomes significant."""
 STEP = 9.0
 """Times the median variance that a step inside a block may explain, three standard deviations: of good blocks 1 in 70 goes."""
-ROUNDING = 1e-9  # of the largest eigenvalue: no direction in which strata could be told apart
+ROUNDING = 1e-9  # of the largest eigenvalue: no direction in which strata could be separated
 
 
 class NoAnswer(StrEnum):
@@ -146,7 +146,7 @@ def differ(values: ArrayLike, labels: NDArray[np.int64]) -> Difference | NoAnswe
 
 
 def _without_line(values: Floats, weight: Floats) -> tuple[Floats, NDArray[np.int64]]:
-    """What a straight line leaves of each block, 0 where the weight is 0; and how many readings it leaves free."""
+    """Residuals of a straight line through each block, 0 where the weight is 0; and their degrees of freedom."""
     count = np.maximum(weight.sum(axis=1), 1.0)[:, None]
     place = np.arange(BLOCK) - (weight * np.arange(BLOCK)).sum(axis=1)[:, None] / count
     off = values - (weight * values).sum(axis=1)[:, None] / count

@@ -112,7 +112,7 @@ def get_photo_of_alarm(
     if found.removed_at is not None:
         raise NotFound(
             _("{who} has removed this photo: {why}").format(who=found.removed_by, why=found.removed_why),
-            _("What it showed was deleted; nobody has it here any more."),
+            _("What it showed was deleted."),
         )
     return served(request, found, "no-cache")
 

@@ -21,6 +21,6 @@ def at_20_words(found: AtReference | Missing) -> str:
     )
     if found.uncertainty is None:
         return said
-    return f"{said} " + _("Uncertainty by temperature and coefficient {u} (k = 2).").format(
+    return f"{said} " + _("Uncertainty {u} (k = 2), from the uncertainties that are stated.").format(
         u=plain_um(2 * found.uncertainty, 2)
     )
