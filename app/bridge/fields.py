@@ -1,6 +1,5 @@
 """Fields of readings as others write them, in files, lines and messages; as ``POST /readings`` takes them."""
 
-import re
 from math import isfinite
 from typing import Any, Final, NamedTuple
 from zoneinfo import ZoneInfo
@@ -29,7 +28,7 @@ TEMPERATURES: Final = FIELDS[-2:]
 """Fields of the context, °C. What is no number is left out: no reading is lost to a sensor."""
 HIGHEST_NUMBER: Final = 2_147_483_647
 LONGEST_TEXT: Final = 128
-_CELSIUS: Final = re.compile(r"\s*[°º]?C$")
+_CELSIUS: Final = ("°C", "ºC", "C")
 
 
 class Form(NamedTuple):
@@ -80,7 +79,8 @@ class Form(NamedTuple):
         return text
 
     def _degrees(self, text: str) -> float | None:
-        text = _CELSIUS.sub("", text)
+        unit = next((each for each in _CELSIUS if text.endswith(each)), "")
+        text = text.removesuffix(unit).rstrip()
         try:
             degrees = number(text, self._decimal_in(text))
         except Unreadable:

@@ -83,6 +83,7 @@ def acknowledge(
     reactions = Reactions(session)
     _refuse(row, action, offset, changed_by, hand, reactions.wrong(row, handled))
     plan = reactions.plan_of(row)
+    handled_with = (None, None) if plan is None else (plan.id, plan.version)  # what follows may expire the plan
     follows: dict[Action, Callable[[], Outcome]] = {
         "tool_replaced": lambda: _tool_replaced(session, row, comment, caller, offset),
         "keep_cutting": lambda: _keep_cutting(session, row, comment, caller),
@@ -97,8 +98,7 @@ def acknowledge(
     alarm.acknowledged_at, alarm.acknowledged_by = datetime.now(UTC), caller.name
     alarm.action, alarm.comment, alarm.outcome = action, comment, outcome
     alarm.cause, alarm.corrective_action = handled
-    if plan is not None:
-        alarm.reaction_plan, alarm.reaction_version = plan.id, plan.version
+    alarm.reaction_plan, alarm.reaction_version = handled_with
     said = {
         "cause": reactions.name_of(handled.cause),
         "corrective_action": reactions.name_of(handled.corrective_action),

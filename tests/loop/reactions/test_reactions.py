@@ -77,6 +77,16 @@ def test_an_alarm_keeps_the_version_that_it_was_handled_with(shop: Shop) -> None
         session.flush()
 
 
+@pytest.mark.parametrize("action", ["tool_replaced", "keep_cutting", "false_reading", "sister_tool", "noted"])
+def test_what_follows_from_an_alarm_leaves_its_plan_with_it(shop: Shop, action: str) -> None:
+    made = plan(shop)
+    shop.call("PATCH", f"/machines/{shop.machine}/tools/3", sister=13)
+    shop.read(350.0)  # wear reached: its correction is held
+    done = shop.acknowledge(shop.alarms()[0]["id"], action)
+    assert (done["state"], done["action"]) == ("acknowledged", action)
+    assert (done["reaction_plan"]["plan"], done["reaction_plan"]["version"]) == (made["id"], 1)
+
+
 def test_a_plan_is_for_what_is_there_and_for_alarms_that_have_none(shop: Shop) -> None:
     plan(shop)
     plan(shop, 409)
