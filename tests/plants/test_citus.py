@@ -3,6 +3,8 @@
 Run where `INBAND_TEST_CITUS` names the folder of PostgreSQL's programs with the extension citus built for them.
 """
 
+import ast
+import re
 import threading
 import time
 from collections.abc import Iterator
@@ -14,6 +16,7 @@ import httpx
 import psycopg
 import pytest
 
+from app import HOUSE
 from app.access.keys import add_key
 from app.cli import plants as commands
 from app.core.parameters import read
@@ -161,7 +164,16 @@ class TestPlantOnANode:
             query = "SELECT count(*) FROM reading_summary WHERE characteristic_id = %s AND level = 5"
             assert connection.execute(query, (of_seat,)).fetchone() == (7,)
         with psycopg.connect(coordinator) as connection:
-            assert citus.node_of(connection, "far") == citus.nodes(connection)[1]
+            assert citus.node_of(connection, "far") in citus.nodes(connection)[1:]
+
+    def test_alarms_are_raised_and_repeated_there(self, client: httpx.Client) -> None:
+        seat = seat_of(client, "out")
+        for sequence in (1, 2):
+            answer = client.post("/api/v1/readings", json={"characteristic": seat, "measured": 41.0})
+            assert (answer.status_code, answer.json()["sequence"]) == (201, sequence), answer.text
+        (alarm,) = client.get(f"/api/v1/alarms?characteristic={seat}").json()["items"]
+        assert (alarm["count"], alarm["last_sequence"]) == (2, 2)
+        assert alarm["last_at"] == answer.json()["received_at"]
 
     @pytest.mark.parametrize(
         "path",
@@ -307,6 +319,31 @@ class TestPlantOnANode:
                 assert machines_at(begun, client) == 503
                 node.start()
                 wait_for(lambda: machines_at(begun, client) == 200, "it is served again")
+
+
+def test_no_row_is_changed_by_a_clock_that_moves_on() -> None:
+    """Citus refuses an UPDATE of a distributed table with a volatile function, whatever PostgreSQL thinks of it."""
+    moving = re.compile(r"\b(clock_timestamp|random|gen_random_uuid|timeofday)\(")
+    found = []
+    for path in (HOUSE / "app").rglob("*.py"):
+        for node in ast.walk(ast.parse(path.read_text())):
+            match node:
+                case ast.Constant(value=str(text)):
+                    changes = re.search(r"\bUPDATE\s+\w", text) is not None and moving.search(text) is not None
+                case ast.Assign(targets=targets, value=value):
+                    to_a_row = any(isinstance(part, ast.Attribute) for each in targets for part in ast.walk(each))
+                    changes = (
+                        to_a_row
+                        and moving.search(f"{ast.unparse(value)}") is not None
+                        and "func." in ast.unparse(value)
+                    )
+                case ast.Call(func=ast.Attribute(attr="values")):
+                    changes = moving.search(ast.unparse(node)) is not None
+                case _:
+                    changes = False
+            if changes:
+                found.append(f"{path.relative_to(HOUSE)}:{node.lineno}")  # type: ignore[attr-defined]
+    assert not found
 
 
 def test_without_citus_a_plant_does_not_move(database: Database) -> None:

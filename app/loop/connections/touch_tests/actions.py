@@ -7,7 +7,7 @@ the bridge says that it is taken back, or cannot be.
 from datetime import timedelta
 from typing import Any, Final
 
-from sqlalchemy import func, select
+from sqlalchemy import select
 from sqlalchemy.dialects.postgresql import insert
 from sqlalchemy.orm import Session
 
@@ -95,7 +95,7 @@ def answer(session: Session, machine: str, number: int, given: TouchTestAnswer, 
         )
     test.refused = None if given.yes else given.question
     test.answered_by = caller.name
-    _becomes(test, after)
+    _becomes(row, after)
     record(session, caller.name, "touch test answered", _subject(owner, number), None, given.model_dump())
     return _saved(session, row)
 
@@ -117,9 +117,9 @@ def stop(session: Session, machine: str, number: int, caller: Caller) -> TouchTe
         )
     test.answered_by = caller.name
     if test.state in BEFORE_ANYTHING:
-        _ends(test, "cancelled", _("Stopped before anything was written."))
+        _ends(row, "cancelled", _("Stopped before anything was written."))
     else:
-        _becomes(test, "stopping")
+        _becomes(row, "stopping")
     record(session, caller.name, "touch test stopped", _subject(owner, number), None, {"state": test.state})
     return _saved(session, row)
 
@@ -143,12 +143,12 @@ def report(session: Session, machine: str, number: int, given: TouchTestReport, 
         )
     if given.state == "read" and test.state == "asked":
         _take(test, given)
-        _becomes(test, "read")
+        _becomes(row, "read")
     elif given.state == "written" and test.state == "go":
-        _becomes(test, "written")
+        _becomes(row, "written")
     elif given.state not in {"read", "written"}:
         _take(test, given)
-        _ends(test, given.state, given.detail)
+        _ends(row, given.state, given.detail)
         after = {"tool_memory": test.tool_memory, "mapping": test.mapping, "detail": test.detail}
         record(
             session, caller.name, f"touch test {given.state.replace('_', ' ')}", _subject(owner, number), None, after
@@ -170,7 +170,7 @@ def abandon(session: Session, machine: Machine, caller: Caller) -> None:
     words = _("The connection was removed before the bridge said how it ended.")
     if test.state not in BEFORE_ANYTHING and test.shown_before is not None:
         words = f"{words} {wording.by_hand(test)}"
-    _ends(test, "failed", words)
+    _ends(row, "failed", words)
     record(session, caller.name, "touch test failed", _subject(machine, number), None, {"detail": words})
     _saved(session, row)
 
@@ -191,13 +191,13 @@ def _take(test: TouchTest, given: TouchTestReport) -> None:
             setattr(test, name, value)
 
 
-def _becomes(test: TouchTest, state: str) -> None:
-    test.state, test.state_at = state, func.clock_timestamp()
+def _becomes(row: TouchTestRow, state: str) -> None:
+    row.test.state, row.test.state_at = state, row.now
 
 
-def _ends(test: TouchTest, state: str, detail: str | None) -> None:
-    _becomes(test, state)
-    test.ended_at, test.detail = func.clock_timestamp(), detail
+def _ends(row: TouchTestRow, state: str, detail: str | None) -> None:
+    _becomes(row, state)
+    row.test.ended_at, row.test.detail = row.now, detail
 
 
 def _saved(session: Session, row: TouchTestRow) -> TouchTestRow:

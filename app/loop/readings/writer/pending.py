@@ -46,6 +46,7 @@ class PendingAlarm:
     sequence: int | None = None
     last_sequence: int | None = None
     count: int = 0  # readings that raised it now
+    last_at: datetime | None = None  # when they were received
     new: bool = True
     data: dict[str, Any] = field(default_factory=dict)
 

@@ -107,10 +107,12 @@ async def _number_alarms(pipeline: Pipeline, pending: PendingWrites, opening: li
         (int(machine or 0), _number(characteristic), _number(tool), (kind or b"").decode()): _number(alarm)
         for machine, characteristic, tool, kind, alarm in rows
     }
+    received_at = next(stream.last.received_at for stream in pending.touched.values() if stream.last)
     for alarm in pending.raised:
         tool = alarm.tool_memory if alarm.characteristic_id is None else None
         alarm.id = active.get((alarm.machine_id, alarm.characteristic_id, tool, alarm.kind))
         alarm.new = alarm.id is None
+        alarm.last_at = received_at
     new = [alarm for alarm in pending.raised if alarm.new]
     if new:
         (numbers,) = await pipeline.run(((ALARM_NUMBERS, str(len(new))),))

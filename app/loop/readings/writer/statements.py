@@ -272,17 +272,18 @@ SELECT machine_id, number, at, 'correction', offset_before, offset_after, correc
 FROM json_to_recordset($1) AS r(machine_id int, number int, at timestamptz, offset_before float8,
     offset_after float8, correction int, actor text)
 """
-# At the time of the clock: the readings of the transaction were received after its begin, and none of them comes after the alarm.
+# last_at: when the readings that raise it were received, so that none of them comes after it.
 RAISE = """
-INSERT INTO alarm (last_at, machine_id, id, kind, characteristic_id, tool_memory, count, sequence, last_sequence, data)
-SELECT clock_timestamp(), r.* FROM json_to_recordset($1) AS r(machine_id int, id bigint, kind text, characteristic_id int, tool_memory int,
-    count int, sequence bigint, last_sequence bigint, data jsonb)
+INSERT INTO alarm (machine_id, id, kind, characteristic_id, tool_memory, count, sequence, last_sequence, last_at, data)
+SELECT * FROM json_to_recordset($1) AS r(machine_id int, id bigint, kind text, characteristic_id int, tool_memory int,
+    count int, sequence bigint, last_sequence bigint, last_at timestamptz, data jsonb)
 """
 # The sentence tells the newest reading, as the correction that is held does; a tool's alarm keeps the one that raised it.
 REPEAT = """
-UPDATE alarm a SET count = a.count + n.count, last_at = clock_timestamp(), last_sequence = n.last_sequence,
+UPDATE alarm a SET count = a.count + n.count, last_at = n.last_at, last_sequence = n.last_sequence,
     data = CASE WHEN a.characteristic_id IS NULL THEN a.data ELSE n.data END
-FROM json_to_recordset($1) AS n(machine_id int, id bigint, count int, last_sequence bigint, data jsonb)
+FROM json_to_recordset($1) AS n(machine_id int, id bigint, count int, last_sequence bigint, last_at timestamptz,
+    data jsonb)
 WHERE a.machine_id = n.machine_id AND a.id = n.id
 """
 
