@@ -14,6 +14,7 @@ import time
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Future
 from contextlib import AbstractContextManager, suppress
+from dataclasses import astuple
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any, Final, TypeVar
@@ -341,14 +342,16 @@ class Store:
 
     async def keep_decisions(self, machine: str, decided: Sequence[Decided]) -> None:
         """Keep decisions until the control has heard of them."""
-        rows = [(machine, each.key, each.characteristic, each.action, each.reason) for each in decided]
-        columns = "machine, key, characteristic, action, reason"
-        insert = f"INSERT INTO decision ({columns}) VALUES (?, ?, ?, ?, ?) ON CONFLICT (machine, key) DO NOTHING"  # noqa: S608
+        rows = [(machine, *astuple(each)) for each in decided]
+        columns = "machine, key, characteristic, action, reason, measure_next"
+        insert = f"INSERT INTO decision ({columns}) VALUES (?, ?, ?, ?, ?, ?) ON CONFLICT (machine, key) DO NOTHING"  # noqa: S608
         await self._run(lambda database: database.executemany(insert, rows))
 
     async def decisions(self, machine: str) -> list[Decided]:
         """The decisions that are kept, oldest first."""
-        query = "SELECT key, characteristic, action, reason FROM decision WHERE machine = ? ORDER BY rowid"
+        query = (
+            "SELECT key, characteristic, action, reason, measure_next FROM decision WHERE machine = ? ORDER BY rowid"
+        )
         return [
             Decided(*row) for row in await self._run(lambda database: database.execute(query, (machine,)).fetchall())
         ]

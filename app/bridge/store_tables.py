@@ -32,7 +32,7 @@ CREATE TABLE IF NOT EXISTS location (
 );
 CREATE TABLE IF NOT EXISTS decision (
     machine TEXT NOT NULL, key TEXT NOT NULL, characteristic TEXT NOT NULL, action TEXT NOT NULL, reason TEXT NOT NULL,
-    PRIMARY KEY (machine, key)
+    measure_next INTEGER, PRIMARY KEY (machine, key)
 );
 CREATE TABLE IF NOT EXISTS fact (machine TEXT NOT NULL, name TEXT NOT NULL, value TEXT NOT NULL, PRIMARY KEY (machine, name));
 """
@@ -43,7 +43,11 @@ ADD: Final = (
     " ON CONFLICT (machine, key) DO NOTHING"
 )
 MOST_REASON: Final = 500  # characters
-LATER_COLUMNS: Final = (("intent", "merged", "TEXT"), ("intent", "turn", "INTEGER"))
+LATER_COLUMNS: Final = (
+    ("intent", "merged", "TEXT"),
+    ("intent", "turn", "INTEGER"),
+    ("decision", "measure_next", "INTEGER"),
+)
 """Those that a store of an older bridge does not have. merged: numbers that an order takes along; turn: answers in their order."""
 
 

@@ -578,13 +578,13 @@ def test_an_edit_is_told_though_each_reading_asks_for_corrections(tmp_path: Path
 
 def test_a_stop_is_kept_for_the_control_and_what_is_sent_again_stops_nothing(tmp_path: Path) -> None:
     server = Scripted()
-    server.decision = replace(server.decision, action="stop", reason=Reason(code="probe_fault"))
+    server.decision = replace(server.decision, action="stop", reason=Reason(code="probe_fault"), measure_next=1)
 
     async def before(store: Store) -> None:
         await store.add(M, [Received("lathe-1:7:1", {"measured": 30.0}, Position(7, 1))])
 
     unit = story(tmp_path, server, before)
-    stop = Decided("lathe-1:7:1", "shaft-1", "stop", "probe_fault")
+    stop = Decided("lathe-1:7:1", "shaft-1", "stop", "probe_fault", 1)
     assert unit.decisions == [stop]
     assert run(unit.store.decisions(M)) == [stop], "a bridge that is started anew tells it, too"
     assert run(server_side.heartbeat(unit))["carries_decisions"] is True

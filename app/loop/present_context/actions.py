@@ -1,7 +1,7 @@
 """Setting what a machine works at, and putting it on its readings that bring no context.
 
-A reading's context is written once and never changed. So only a reading without any gets one that was measured while it held, from a periodic job: the door for
-readings knows nothing of it.
+A reading's context is written once and never changed. A reading without any that was measured while it held gets it from a periodic
+job; one that brings temperatures alone gets it with them, when it is stored.
 """
 
 from datetime import UTC, datetime, timedelta

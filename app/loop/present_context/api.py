@@ -27,8 +27,8 @@ def set_present_context(
 ) -> PresentContextOut:
     """Say what the machine works at from now on; `{}`: nothing is known. Readings that came before keep what they have.
 
-    It is put within a minute on readings that bring no context at all; one that brings any keeps that alone. The key of the machine
-    may set it, a bridge or an MES for example.
+    It is put within a minute on readings that bring no context but temperatures; one that brings any other keeps that alone.
+    The key of the machine may set it, a bridge or an MES for example.
     """
     row = machine_for(session, caller, machine, "operator")
     return PresentContextOut.of(row.key, actions.set_present(session, row.key, given, caller))

@@ -29,14 +29,16 @@ def test_readings_that_bring_none_get_what_the_machine_worked_at_when_they_came(
     shop.read(0.2)
     shop.read(0.3, context={"operator": "Milica"})
     works_at(shop, order="A-2")
-    shop.read(0.4)
+    shop.read(0.4, context={"part_temperature": 21.5})
+    shop.push([0.1], context=[{"machine_temperature": 24.0}])
     assert works_at(shop)["context"]["order"] is None
     shop.read(0.5)
-    assert [said(shop, sequence) for sequence in range(1, 6)] == [
+    assert [said(shop, sequence) for sequence in range(1, 7)] == [
         {},
         {"order": "A-1", "nest": 2},
         {"operator": "Milica"},
-        {"order": "A-2"},
+        {"order": "A-2", "part_temperature": 21.5},
+        {"order": "A-2", "machine_temperature": 24.0},
         {},
     ]
     listed = shop.call("GET", f"/readings?characteristic={shop.characteristic}&context.order=A-1")["items"]

@@ -171,7 +171,14 @@ def _beside_readings(verdicts: list[Verdict]) -> Iterable[tuple[str, list[Any]]]
         return _place(verdict.stream) | {"sequence": verdict.sequence}
 
     yield TOUCHES, [at(v) | {"touches": v.reading.touches} for v in verdicts if v.reading.touches is not None]
-    yield CONTEXT, [at(v) | {"context": v.reading.context} for v in verdicts if v.reading.context is not None]
+    yield (
+        CONTEXT,
+        [
+            at(v) | {"measured_at": v.measured_at, "context": v.reading.context}
+            for v in verdicts
+            if v.reading.context is not None
+        ],
+    )
     yield RESULTS, [at(v) | v.results._asdict() for v in verdicts if v.results is not None]
     yield NEXT, [at(v) | {"measure_next": v.measure_next} for v in verdicts if v.measure_next is not None]
     moved = {id(v.stream): v.stream for v in verdicts if v.stream.level_moved}.values()

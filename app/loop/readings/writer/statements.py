@@ -220,9 +220,13 @@ TOUCHES = """
 INSERT INTO reading_touches (machine_id, characteristic_id, sequence, touches)
 SELECT * FROM json_to_recordset($1) AS r(machine_id int, characteristic_id int, sequence bigint, touches jsonb)
 """
+# A sensor's temperatures say nothing of the work: beside them the reading gets what the machine works at, as it does without them.
 CONTEXT = """
 INSERT INTO reading_context (machine_id, characteristic_id, sequence, context)
-SELECT * FROM json_to_recordset($1) AS r(machine_id int, characteristic_id int, sequence bigint, context jsonb)
+SELECT r.machine_id, r.characteristic_id, r.sequence, coalesce(p.context, '{}') || r.context
+FROM json_to_recordset($1) AS r(machine_id int, characteristic_id int, sequence bigint, measured_at timestamptz, context jsonb)
+LEFT JOIN present_context p ON p.machine_id = r.machine_id AND r.measured_at >= p.since
+    AND r.context - '{part_temperature,machine_temperature}'::text[] = '{}'
 """
 _RESULTS = """machine_id int, characteristic_id int, sequence bigint, run_out float8, out_of_roundness float8, taper float8,
     slope float8, repeat_range float8, repeat_deviation float8, sections_outside smallint, rejected bool, straightness float8"""
