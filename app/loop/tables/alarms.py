@@ -40,6 +40,7 @@ class Alarm(Base):
             unique=True,
             postgresql_where=text("acknowledged_at IS NULL AND characteristic_id IS NULL"),
         ),
+        Index("alarm_tool_idx", "machine_id", "tool_memory", "id", postgresql_where=text("characteristic_id IS NULL")),
         Index("alarm_active_idx", "machine_id", "id", postgresql_where=text("acknowledged_at IS NULL")),
         Index("alarm_acknowledged_idx", "acknowledged_at", "id", postgresql_where=text("acknowledged_at IS NOT NULL")),
     )
