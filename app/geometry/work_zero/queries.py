@@ -6,6 +6,7 @@ from statistics import median
 from typing import NamedTuple
 
 from sqlalchemy import Select, func, select, tuple_
+from sqlalchemy.dialects.postgresql import distinct_on
 from sqlalchemy.orm import Session, aliased
 
 from app.core.decision.step import rounded
@@ -204,7 +205,7 @@ def history(
     references = session.scalars(
         select(WorkZero).where(WorkZero.machine_id == machine.id, WorkZero.id == settings.reference)
         if settings.basis == "frozen"
-        else query.distinct(WorkZero.work_offset).order_by(WorkZero.work_offset, *OLDEST_FIRST)
+        else query.ext(distinct_on(WorkZero.work_offset)).order_by(WorkZero.work_offset, *OLDEST_FIRST)
     ).all()
     return [
         _against(zero, [row for row in references if row.work_offset == zero.work_offset], settings) for zero in zeros
