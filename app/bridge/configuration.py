@@ -117,13 +117,14 @@ class Machine(Struct, forbid_unknown_fields=True, frozen=True, kw_only=True):
 class Server(Struct, forbid_unknown_fields=True, frozen=True):
     """The server. ca: a file with the certificate of the authority that signed the server's, if it is one of the plant's own.
 
-    ask: how often corrections are asked for that no reading has announced, s. heartbeat: s.
+    ask: how often corrections are asked for that no reading has announced, s. heartbeat: s; the server counts a minute without
+    one as a pause of the machine, and a bridge as silent.
     """
 
     url: str
     ca: str | None = None
     ask: Positive = 5.0
-    heartbeat: Positive = 10.0
+    heartbeat: Annotated[float, Meta(gt=0, le=30)] = 10.0
 
 
 class Store(Struct, forbid_unknown_fields=True, frozen=True):

@@ -44,9 +44,8 @@ def _raised(session: Session, alarm: Alarm, data: dict[str, Any]) -> Alarm:
     return alarm
 
 
-def _active_of_characteristic(
-    session: Session, machine_id: int, characteristic_id: int, kind: AlarmKind
-) -> Alarm | None:
+def active(session: Session, machine_id: int, characteristic_id: int, kind: AlarmKind) -> Alarm | None:
+    """The alarm of this kind about a characteristic that is active."""
     return session.scalars(
         select(Alarm)
         .where(
@@ -59,11 +58,6 @@ def _active_of_characteristic(
     ).one_or_none()
 
 
-def is_active(session: Session, machine_id: int, characteristic_id: int, kind: AlarmKind) -> bool:
-    """Tell if an alarm of this kind about a characteristic is active."""
-    return _active_of_characteristic(session, machine_id, characteristic_id, kind) is not None
-
-
 def raise_for_characteristic(
     session: Session,
     machine_id: int,
@@ -73,10 +67,9 @@ def raise_for_characteristic(
     data: dict[str, Any],
 ) -> Alarm:
     """Raise an alarm about a characteristic that no reading raises, or count one more if it is active already."""
-    active = _active_of_characteristic(session, machine_id, characteristic_id, kind)
     return _raised(
         session,
-        active
+        active(session, machine_id, characteristic_id, kind)
         or Alarm(
             machine_id=machine_id, characteristic_id=characteristic_id, tool_memory=tool_memory or None, kind=kind.name
         ),
@@ -129,8 +122,7 @@ def settle_for_characteristic(
     outcome: dict[str, Any],
 ) -> Alarm | None:
     """As `settle_for_place`, of an alarm about a characteristic."""
-    active = _active_of_characteristic(session, machine_id, characteristic_id, kind)
-    return _settled(session, active, by, comment, outcome)
+    return _settled(session, active(session, machine_id, characteristic_id, kind), by, comment, outcome)
 
 
 def _settled(session: Session, active: Alarm | None, by: str, comment: str, outcome: dict[str, Any]) -> Alarm | None:

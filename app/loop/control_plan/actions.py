@@ -124,7 +124,7 @@ def keep_context(session: Session, machine_id: int, characteristic_id: int) -> N
     lacking = queries.lacking(session, row, row.context_seen)
     if lacking.newest <= row.context_seen:
         return
-    if lacking.fields or alarms.is_active(session, machine_id, characteristic_id, CONTEXT_MISSING):
+    if lacking.fields or alarms.active(session, machine_id, characteristic_id, CONTEXT_MISSING):
         lock_machines(
             session, [machine_id]
         )  # no reading comes in any more: those that are there get what the machine works at
@@ -136,9 +136,9 @@ def keep_context(session: Session, machine_id: int, characteristic_id: int) -> N
         session.get_one(Characteristic, (machine_id, characteristic_id)),
     )
     if lacking.fields:
-        alarm = alarms.raise_for_characteristic(
-            session, machine_id, characteristic_id, None, CONTEXT_MISSING, lacking.as_data
-        )
+        before = alarms.active(session, machine_id, characteristic_id, CONTEXT_MISSING)
+        data = lacking.as_data(before.data if before else {})
+        alarm = alarms.raise_for_characteristic(session, machine_id, characteristic_id, None, CONTEXT_MISSING, data)
         publish(session, alarms.news(machine.key, alarm) | {"characteristic": characteristic.key})
     else:
         outcome = {"code": "complete", "sequence": lacking.newest}

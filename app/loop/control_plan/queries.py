@@ -1,7 +1,7 @@
 """Control plans, the state of each now, and the measurements that were missed. Never writes."""
 
 from bisect import bisect_right
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from datetime import UTC, datetime, timedelta
 from itertools import pairwise
 from typing import Any, NamedTuple
@@ -66,16 +66,21 @@ class Look(NamedTuple):
 
 
 class Lacking(NamedTuple):
-    """Required context that the newest readings lack. fields: how many lack each that any lacks. last: the last of them."""
+    """Required context that the newest readings lack. fields: how many lack each that any lacks. readings: that lack any; last: of them."""
 
     fields: dict[str, int]
+    readings: int
     last: int
     newest: int
 
-    @property
-    def as_data(self) -> dict[str, Any]:
-        """For its alarm."""
-        return {"fields": list(self.fields), "readings": max(self.fields.values()), "last": self.last}
+    def as_data(self, before: Mapping[str, Any]) -> dict[str, Any]:
+        """For its alarm. before: its data, with what earlier looks found since it was raised."""
+        fields = [*before.get("fields", ()), *self.fields]
+        return {
+            "fields": [field.value for field in ContextField if field.value in fields],
+            "readings": int(before.get("readings", 0)) + self.readings,
+            "last": self.last,
+        }
 
 
 class MissedRow(NamedTuple):
@@ -180,11 +185,12 @@ def _begin(row: ControlPlan, stream: Stream, own: Sequence[signs.Own], now: date
 
 
 _LACKING = text("""
-SELECT field, count(*), max(r.sequence) FROM unnest(CAST(:fields AS text[])) AS field, reading r
+SELECT field, count(*), max(r.sequence), count(DISTINCT r.sequence)
+FROM unnest(CAST(:fields AS text[])) AS field, reading r
 LEFT JOIN reading_context c USING (machine_id, characteristic_id, sequence)
 WHERE r.machine_id = :machine AND r.characteristic_id = :characteristic AND r.sequence BETWEEN :first AND :last
     AND r.code <> :imported AND r.received_at >= :since AND c.context ->> field IS NULL
-GROUP BY field
+GROUP BY GROUPING SETS ((field), ())
 """)
 
 
@@ -201,11 +207,10 @@ def lacking(session: Session, row: ControlPlan, after: int = 0) -> Lacking:
         "imported": Code.IMPORTED.value,
         "since": row.since,
     }
-    found = {field: (count, last) for field, count, last in session.execute(_LACKING, where)}
+    found = {field: (count, last or 0, readings) for field, count, last, readings in session.execute(_LACKING, where)}
+    _times, last, readings = found[None]
     return Lacking(
-        {field.value: found[field.value][0] for field in fields if field.value in found},
-        max((last for _count, last in found.values()), default=0),
-        newest,
+        {field.value: found[field.value][0] for field in fields if field.value in found}, readings, last, newest
     )
 
 

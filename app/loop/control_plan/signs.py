@@ -7,6 +7,7 @@ Never writes.
 from bisect import bisect_right
 from collections.abc import Collection, Sequence
 from datetime import UTC, datetime
+from math import inf
 from typing import NamedTuple
 
 from sqlalchemy import and_, func, or_, select, true
@@ -123,30 +124,46 @@ def _newest_of_others(
 
 
 def runs(session: Session, row: ControlPlan, own: Characteristic, since: float) -> list[Run]:
-    """Times in which the control reported that it ran. None where another part was measured since: it may have run for that one."""
+    """Times in which the control reported that it ran, until another part was measured: from then on it may have run for that one.
+
+    None where `MOST` readings of that part do not reach back to its first.
+    """
     if row.minutes is None:
         return []
     moment = datetime.fromtimestamp(since, UTC)
     another_part = (
-        select(Stream.characteristic_id)
+        select(
+            func.min(func.least(Reading.measured_at, Reading.received_at)),
+            func.bool_or(Reading.sequence == Stream.sequence - MOST + 1),
+        )
+        .join(
+            Stream,
+            (Stream.machine_id == Reading.machine_id) & (Stream.characteristic_id == Reading.characteristic_id),
+        )
         .join(
             Characteristic,
             (Characteristic.machine_id == Stream.machine_id) & (Characteristic.id == Stream.characteristic_id),
         )
         .where(
+            Reading.machine_id == row.machine_id,
             Stream.machine_id == row.machine_id,
+            Characteristic.machine_id == row.machine_id,
             Characteristic.id != own.id,
             or_(Characteristic.part.is_distinct_from(own.part), Characteristic.part.is_(None)),
             Characteristic.form_of.is_distinct_from(own.id),
             Stream.last_measured_at > moment,
+            Reading.sequence > Stream.sequence - MOST,
+            Reading.measured_at > moment,
         )
     )
-    if session.scalar(select(another_part.exists())):
+    first, more = session.execute(another_part).one()
+    if more:
         return []
     times = select(MachineRun.begin, MachineRun.until).where(
         MachineRun.machine_id == row.machine_id, MachineRun.until > moment
     )
-    return [Run(begin.timestamp(), until.timestamp()) for begin, until in session.execute(times)]
+    end = inf if first is None else first.timestamp()
+    return [Run(begin.timestamp(), min(until.timestamp(), end)) for begin, until in session.execute(times)]
 
 
 def events(

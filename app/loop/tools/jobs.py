@@ -167,11 +167,7 @@ def tell_gain(session: Session, unit: Unit) -> None:
         return
     lock_machines(session, [machine_id])
     for characteristic_id, key, factor, gain in told:
-        if (
-            gain is None
-            or gain.verdict is None
-            or alarms.is_active(session, machine_id, characteristic_id, UNUSUAL_GAIN)
-        ):
+        if gain is None or gain.verdict is None or alarms.active(session, machine_id, characteristic_id, UNUSUAL_GAIN):
             continue
         data = {
             "characteristic": key,

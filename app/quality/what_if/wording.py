@@ -164,20 +164,36 @@ def cautions(past: ToolHistory) -> list[str]:
 
 def sampled(sampling: Sampling) -> list[str]:
     """Limits of a replay with fewer parts measured."""
-    change, alarm = sampling.plan.after_change, sampling.plan.after_alarm
-    tightened = ngettext(
-        "Every part is measured for {n} reading after an alarm,",
-        "Every part is measured for {n} readings after an alarm,",
-        alarm,
-    ).format(n=alarm)
-    tightened += " " + _("and for {n} after a tool change or an offset set by hand.").format(n=change)
-    if not change and not alarm:
-        tightened = _("After an alarm and a tool change no more parts are measured: the control plan does not say so.")
-    sentences = [
-        _("Each stored reading is taken for a part; a part that was not measured then is not known."),
-        tightened,
-        _("Sudden events fall where they fell: of few of them in the period, these counts show little."),
-    ]
+    plan = sampling.plan
+    sentences = [_("Each stored reading is taken for a part; a part that was not measured then is not known.")]
+    if plan.after_alarm:
+        sentences += [
+            ngettext(
+                "After an alarm that a reading of this characteristic raises, every part is measured for {n} reading.",
+                "After an alarm that a reading of this characteristic raises, every part is measured for {n} readings.",
+                plan.after_alarm,
+            ).format(n=plan.after_alarm),
+            _(
+                "Other alarms of the characteristic and of its tool ask for more measurements in the control plan, but not here."
+            ),
+        ]
+    if plan.after_change:
+        sentences.append(
+            ngettext(
+                "At the beginning, after a tool change and after an offset set by hand, every part is measured for {n} reading; "
+                "in the control plan after a tool change only.",
+                "At the beginning, after a tool change and after an offset set by hand, every part is measured for {n} readings; "
+                "in the control plan after a tool change only.",
+                plan.after_change,
+            ).format(n=plan.after_change)
+        )
+    if not plan.after_alarm and not plan.after_change:
+        sentences.append(
+            _("No more parts are measured after an alarm or a tool change; after a probe fault, the next one is.")
+        )
+    if plan.minutes or plan.per_shift:
+        sentences.append(_("What the control plan asks for by minutes or by shift is not replayed."))
+    sentences.append(_("Sudden events fall where they fell: of few of them in the period, these counts show little."))
     if sampling.has_gaps:
         sentences.insert(
             1,

@@ -110,10 +110,16 @@ def test_fewer_parts_measured_on_the_stored_history(ran: Shop, server: Server) -
     assert fewer["figures"]["readings"] == PARTS
     assert fewer["figures"]["corrections"] < today["corrections"] / 2
     assert (found["after_change"], found["after_alarm"]) == (0, 2), "what is not given is as the plan says"
-    assert "stored reading is taken for a part" in " ".join(found["cautions"])
+    said = " ".join(found["cautions"])
+    assert "stored reading is taken for a part" in said
+    assert "raises, every part is measured for 2 readings. Other alarms" in said
+    assert "After a tool change" not in said
+    assert "offset set by hand, every part is measured for 1 reading; in" in " ".join(
+        ask(ran, what="/sampling", every=[4], after_change=1)["cautions"]
+    )
     page = Person(server, "viewer").open(f"/characteristics/{ran.characteristic}/what-if?k=3")
     assert "With fewer parts measured" in page
-    assert "the control plan does not say so" in page
+    assert "No more parts are measured after an alarm" in page
 
 
 def test_what_was_held_and_what_was_excluded_removed_nothing(shop: Shop) -> None:
