@@ -78,6 +78,13 @@ class Form(NamedTuple):
             raise Unreadable(f"is longer than {LONGEST_TEXT} characters" if text else "is empty")
         return text
 
+    def left_out(self, field: str, value: Any) -> str | None:
+        """Words behind the value of a temperature that is something, and no number of °C; None of any other."""
+        text = str(value).strip()
+        if field not in TEMPERATURES or value is None or not text or self._degrees(text) is not None:
+            return None
+        return f'is no number of °C, with decimal = "{self._decimal_in(text)}"; left out'
+
     def _degrees(self, text: str) -> float | None:
         unit = next((each for each in _CELSIUS if text.endswith(each)), "")
         text = text.removesuffix(unit).rstrip()

@@ -460,6 +460,9 @@ class _Reader:
                     own = str(value)
                 elif (read := form.value(field_, value)) is not None:
                     put(body, field_, read)
+                elif words := form.left_out(field_, value):
+                    column = self.settings.columns.get(field_, field_)
+                    self._remark(aqdef.Remark(line, column, str(value)[:40], words))
             except Unreadable as error:
                 column = self.settings.columns.get(field_, field_ if name == EVERY or "measured" in fields else name)
                 self._fault(line, column, f"{error}.", str(value)[:40])

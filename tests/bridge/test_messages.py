@@ -87,12 +87,13 @@ def test_what_is_no_reading_is_said(content: object, fields: dict[str, str], wor
 @pytest.mark.parametrize(
     ("sent", "context"),
     [(sent, {"part_temperature": 24.5}) for sent in (24.5, "24.5", "24.5 °C", "24.5C")]
-    + [(sent, None) for sent in ("----", "76.1 °F", "", None)],
+    + [(sent, None) for sent in ("----", "21,5", "76.1 °F", "", None)],
 )
 def test_a_temperature_is_a_circumstance_and_costs_no_reading(sent: object, context: object) -> None:
     [found] = foreign({"v": 40.0, "id": 12, "t": sent}, {"measured": "v", "key": "id", "part_temperature": "t"})
     assert found.fault is None
     assert found.body.get("context") == context
+    assert bool(found.remark) == bool(sent and not context), "what is left out is said"
 
 
 def test_a_cell_of_a_sensor_that_failed_costs_no_reading() -> None:

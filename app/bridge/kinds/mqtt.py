@@ -116,6 +116,7 @@ class MqttLink:
         self.machine = machine
         self.settings: Settings = machine.settings
         self.clock = Clock()
+        self.remark = ""
         self.base = f"{self.settings.prefix}/{self.settings.name or machine.key}"
         self.port = self.settings.port or (8883 if self.settings.tls else 1883)
         self.where = f"{self.settings.host}:{self.port}"
@@ -324,6 +325,7 @@ class MqttLink:
             found = [own_reading(payload, machine.characteristics, self._form)]
         received = []
         for index, each in enumerate(found):
+            self.remark = each.remark or self.remark
             if each.fault is None and each.key is not None:
                 received.append(Received(each.key, each.body, mark=(message, each.said)))
                 continue

@@ -101,6 +101,7 @@ class TextLink:
         self._source: Source[Line] | None = None
         self._unstored: list[Received] = []
         self._lines = self._found = self._damaged = 0
+        self._left_out = ""  # the last temperature
 
     async def connect(self) -> str:
         """Open the source; what it is called."""
@@ -161,6 +162,8 @@ class TextLink:
                     continue
                 if (read := form.value(field, value)) is not None:
                     put(body, field, read)
+                elif words := form.left_out(field, value):
+                    self._left_out = f"{field} {value[:40]!r} {words}."
         except Unreadable as error:
             return self._refused(line, f"{field} {value[:40]!r} {error}.")
         if "key" in fields:
@@ -182,6 +185,8 @@ class TextLink:
             words.append(
                 f"Of {self._lines} lines that came none holds a reading as an expression of lines describes it."
             )
+        if self._left_out:
+            words.append(self._left_out)
         if self._damaged:
             words.append(f"Lines longer than {LONGEST_LINE} characters since the start: {self._damaged}. Baud rate?")
         return " ".join(words)

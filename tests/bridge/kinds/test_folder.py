@@ -92,6 +92,14 @@ def test_tables_that_people_print_are_read(tmp_path: Path) -> None:
     ]
 
 
+def test_a_temperature_with_the_other_decimal_sign_is_left_out_and_said_once(tmp_path: Path) -> None:
+    text = "feature;actual;part;temp\nD40;40,0123;P1;21.5\nD40;40,0124;P2;21.6\nD40;40,0125;P3;21,7\nD40;40,0126;P4;\n"
+    columns = {"characteristic": "feature", "measured": "actual", "part": "part", "part_temperature": "temp"}
+    content = read(tmp_path, text, columns=columns, decimal=",")
+    assert [each.body.get("context") for each in content.entries] == [None, None, {"part_temperature": 21.7}, None]
+    assert content.remarks == ["lines 2, 3, temp: '21.5' is no number of °C, with decimal = \",\"; left out"]
+
+
 def test_values_of_aqdef_that_are_empty_are_not_called_marked(tmp_path: Path) -> None:
     rows = [f"{F}0{F}23.11.2026/06:05:00", f"40.001{F}255{F}23.11.2026/06:06:00", f"40.002{F}0{F}23.11.2026/06:07:00"]
     text = "\n".join(["K0100 1", "K2001/1 D40", "K2142/1 mm", *rows, ""])

@@ -97,6 +97,14 @@ def test_parity_and_signs_of_a_handshake_are_left_out() -> None:
     assert sizes(printed("Maß\nD40 ACTUAL 40.0\n".encode("cp1252"), encoding="cp1252")) == [("shaft-1", 40.0, None)]
 
 
+def test_a_temperature_that_is_left_out_is_said() -> None:
+    link = TextLink(machine(lines=[r"(?P<characteristic>\w+) (?P<measured>\S+) AT (?P<part_temperature>\S+)"]))
+    link._source = Canned(link, b"D40 40.0 AT 21,5\n")
+    [found] = run(link.fetch(Position()))
+    assert "context" not in found.body
+    assert link.remark == "part_temperature '21,5' is no number of °C, with decimal = \".\"; left out."
+
+
 def test_what_is_wrong_goes_to_the_quarantine_with_its_line() -> None:
     size, name = printed(b"D40 ACTUAL 4-0\nD99 ACTUAL 1.0\n")
     assert "'D40 ACTUAL 4-0': measured '4-0' is not a number" in str(size.fault)
