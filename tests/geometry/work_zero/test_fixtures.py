@@ -7,7 +7,9 @@ import psycopg
 import pytest
 from sqlalchemy import select
 
+from app.geometry.work_zero import queries
 from app.geometry.work_zero.tables import WorkZero
+from app.loop.machines.queries import machine_named
 from tests.conftest import Server
 from tests.geometry.work_zero.bench import POCKET, moved, moved_along, post
 from tests.shop import Shop
@@ -41,6 +43,9 @@ class TestFixtures:
         assert shop.alarms() == []
         figure = shop.call("GET", f"{path}/figure?theme=dark")
         assert moved_along(figure, "x") == pytest.approx([12.0, 50.0, 60.0, 1.0])
+        with shop.server.database.begin() as session:  # here a warning of a library is a fault
+            history = queries.history(session, machine_named(session, shop.machine), "vice")
+        assert [each.zero.id for each in history][:2] == [first["id"], near["id"]]
 
     def test_against_a_frozen_one_and_the_median(self, shop: Shop) -> None:
         numbers = [post(shop, fixture="vice", touches=moved(dx))["id"] for dx in (0.0, 0.010, 0.012, 0.5, 0.011)]
