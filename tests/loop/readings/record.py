@@ -58,7 +58,8 @@ BROKEN = (
     """SELECT s.*, r.* FROM stream s JOIN reading r
            ON r.machine_id = s.machine_id AND r.characteristic_id = s.characteristic_id AND r.sequence = s.sequence
        WHERE (s.last_measured, s.last_deviation, s.last_average, s.last_zone, s.last_received_at)
-           IS DISTINCT FROM (r.measured, r.deviation, r.average_after, r.zone, r.received_at)""",
+           IS DISTINCT FROM (r.measured, r.deviation, r.average_after, r.zone, r.received_at)
+           AND r.code <> 'imported'""",  # history may be older than the state
     """SELECT s.characteristic_id, s.last_measured_at, max(r.measured_at) FROM stream s JOIN reading r
            ON r.machine_id = s.machine_id AND r.characteristic_id = s.characteristic_id
        GROUP BY s.machine_id, s.characteristic_id HAVING s.last_measured_at <> max(r.measured_at)""",
@@ -86,15 +87,19 @@ BROKEN = (
            ORDER BY id DESC LIMIT 1) e ON true WHERE abs(t."offset" - e.offset_after) > 1e-9""",
     """SELECT c.machine_id, c.number, count(e.id) FROM correction c LEFT JOIN tool_event e
            ON e.machine_id = c.machine_id AND e.correction = c.number
-       GROUP BY c.machine_id, c.number, c.status HAVING count(e.id) <> (c.status = 'applied')::int""",
+       GROUP BY c.machine_id, c.number, c.status HAVING count(e.id) - (count(e.id) = 2 AND EXISTS (
+           -- the machine named another offset for what a reading had confirmed
+           SELECT FROM alarm a WHERE a.machine_id = c.machine_id AND a.kind = 'offset_differs'
+       ))::int <> (c.status = 'applied')::int""",
     # one active alarm for one trouble, counted as often as readings name it
-    """SELECT machine_id, characteristic_id, kind FROM alarm WHERE acknowledged_at IS NULL
+    """SELECT machine_id, characteristic_id, kind FROM alarm
+       WHERE acknowledged_at IS NULL AND (characteristic_id IS NOT NULL OR tool_memory IS NOT NULL)
        GROUP BY machine_id, characteristic_id, kind, CASE WHEN characteristic_id IS NULL THEN tool_memory END
        HAVING count(*) > 1""",
     """SELECT a.*, r.n FROM alarm a JOIN LATERAL (
            SELECT count(*) AS n, max(sequence) AS last FROM reading r WHERE r.machine_id = a.machine_id
                AND r.characteristic_id = a.characteristic_id AND a.id = ANY(r.alarms)) r ON true
-       WHERE a.sequence IS NOT NULL AND a.characteristic_id IS NOT NULL
+       WHERE a.sequence IS NOT NULL AND a.characteristic_id IS NOT NULL AND a.kind <> 'signal'  -- of a run of readings
            AND (r.n <> a.count OR r.last <> a.last_sequence)""",
     # a summary for each full block and for no other
     f"""SELECT s.characteristic_id, g.lv, s.sequence, count(b.block) FROM stream s

@@ -1,0 +1,132 @@
+"""Random walks over every act of the product, together on one plant: no fault at any step, and a record that holds."""
+
+import re
+import sys
+import time
+from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import contextmanager
+from typing import Any
+
+import pytest
+
+from tests import chance
+from tests.conftest import NewDatabase, drop_database
+from tests.in_process import InProcess, in_process
+from tests.loop.readings.record import must_hold
+from tests.shop import Shop
+from tests.walks.addresses import KNOWN
+from tests.walks.walker import OPENED, WITHOUT_BODY, Walker
+from tests.web.test_bad_input import BODIES, REACTION, Place, operations
+
+
+@pytest.fixture
+def plant(new_database: NewDatabase) -> Iterator[InProcess]:
+    url = new_database()
+    with in_process(url, bridge_silent_after=86_400) as house:
+        yield house
+    drop_database(url)
+
+
+def furnish(house: InProcess) -> None:
+    """A machine whose characteristics share tools or wait for approval, with plans of all scopes and a mandatory context."""
+    more = Shop(house)
+    more.read(6.0)
+    more.read(350.0)
+    seat = f"{more.characteristic}-seat"
+    more.add(seat, average_memory=6)  # the same tool
+    kinds: tuple[dict[str, Any], ...] = ({"mode": "approval"}, {"max_total": 0.02}, {"plausible_jump": 0.05})
+    for tool, given in enumerate(kinds, start=4):
+        more.add(f"{more.characteristic}-{tool}", tool_memory=tool, average_memory=tool + 3, **given)
+    round_: dict[str, Any] = {
+        "target": 0.0,
+        "natural_limit": "lower",
+        "mode": "measure_only",
+        "tool_memory": 0,
+        "average_memory": 0,
+    }
+    more.add(f"{more.characteristic}-round", **round_)
+    more.call("PATCH", f"/machines/{more.machine}/tools/3", sister=13)
+    worn, here = {"kind": "tool_worn"}, {"characteristic": seat}
+    scopes: tuple[dict[str, str], ...] = ({}, worn, here, here | worn)
+    for scope in scopes:
+        more.call("POST", "/reactions/plans", 201, **REACTION | scope)
+    more.call("POST", "/reactions/catalogue", 201, sort="cause", name="Chip")
+    watched: dict[str, Any] = {"every": 3, "after_alarm": 2, "required_context": ["order"], "reason": "Agreed"}
+    more.call("PUT", f"/characteristics/{seat}/control-plan", **watched)
+
+
+def checked(house: InProcess, walker: Walker) -> None:
+    """What must hold after any sequence of acts."""
+    try:
+        must_hold(house.database.dsn)
+    except AssertionError as broken:
+        raise AssertionError("\n".join([str(broken), *walker.trail])) from broken
+    failures = walker.record.rows("SELECT job, subject, error FROM job_failure")
+    assert not failures, "\n".join([*walker.trail, *map(str, failures)])
+    for _ in range(6):
+        walker.look()
+
+
+@contextmanager
+def walking(house: InProcess, seed: int) -> Iterator[Walker]:
+    """A walker; what it did is printed."""
+    walker = Walker(house, seed)
+    try:
+        yield walker
+        assert not walker.faults, "\n\n".join(walker.faults.values())
+    finally:
+        walker.record.connection.close()
+        sys.stdout.write(f"seed {seed}, {walker.steps} steps: {walker.summary()}\n")
+
+
+def walk(house: InProcess, seed: int, steps: int, seconds: float = 1e9) -> None:
+    """So many steps, as long as there is time."""
+    end = time.monotonic() + seconds
+    with walking(house, seed) as walker:
+        while walker.steps < steps and time.monotonic() < end:
+            walker.step()
+            if walker.steps % 20 == 0:
+                checked(house, walker)
+        checked(house, walker)
+
+
+def test_every_act_is_walked() -> None:
+    assert {each.name for each in operations() if each.method != "GET"} == {*BODIES, *WITHOUT_BODY}
+
+
+def test_every_address_is_known() -> None:
+    for path in (*OPENED, *(each.path for each in operations())):
+        known = next((query for part, query in KNOWN if part in path), "")
+        names = set(re.findall(r"\{(\w+)\}", path)) - {"form"}
+        assert names <= set(re.findall(r"\w+", known)), path
+
+
+def test_a_short_walk(plant: InProcess) -> None:
+    furnish(plant)
+    walk(plant, 1, 40)
+
+
+@pytest.mark.long
+def test_a_long_walk(plant: InProcess) -> None:
+    Place(plant)  # with something of everything
+    furnish(plant)
+    walk(plant, chance.seed(1), 3000, 150)
+
+
+@pytest.mark.long
+def test_walkers_at_once(plant: InProcess) -> None:
+    """Three on the same machines: nobody waits for ever, nobody meets a fault."""
+    Place(plant)
+    furnish(plant)
+    seed, end = chance.seed(1), time.monotonic() + 120
+
+    def go(number: int) -> None:
+        with walking(plant, seed + number) as walker:
+            while walker.steps < 500 and time.monotonic() < end:
+                walker.step()
+
+    with ThreadPoolExecutor(3) as pool:
+        list(pool.map(go, range(3)))
+    with walking(plant, seed) as walker:
+        checked(plant, walker)
