@@ -19,9 +19,10 @@ import app.core
 from app import HOUSE
 from app.core.compile_now import compile_each
 from app.core.compiled import compiled, functions_of, plain
+from app.core.control_plan import Plan
 from app.core.decision.loops import follow, follow_each
 from app.core.effect import _missed, measured_effect
-from app.core.replay import Policy, ReplayedCharacteristic, figures_of, without_events
+from app.core.replay import Policy, ReplayedCharacteristic, figures_of, sampled, without_events
 from app.core.spc.cusum import _sums, cusum
 from app.core.spc.ewma import _smoothed, ewma
 from app.core.spc.mixture import _rounds, fitted_two_normals
@@ -113,5 +114,7 @@ def test_no_page_waits_for_the_compiler() -> None:
     signals_of_cusum(cusum(baseline, history)).sides(0)
     fitted_two_normals(np.vstack((history, history)))
     measured_effect(history, (np.arange(3_000) // 9 % 5 * 0.002).astype(np.float64), -1.0, np.arange(3_000) % 100 == 0)
-    figures_of(without_events(history), [Policy((ReplayedCharacteristic(SEAT, 1.0),))] * 2)
+    policy = Policy((ReplayedCharacteristic(SEAT, 1.0),))
+    figures_of(without_events(history), [policy] * 2)
+    sampled(without_events(history), policy, [Plan(every=5, after_alarm=2)])
     assert [list(loop.signatures) for loop in loops] == before

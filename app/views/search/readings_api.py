@@ -49,7 +49,8 @@ def list_readings(
     """Readings in the order of their arrival, those of one batch by characteristic: of a characteristic, a machine, a part, a
     period, an order or another value of their context, or several of these at once.
 
-    The key of a machine sees those of that machine. What is rare in millions of readings is found faster within a period.
+    The key of a machine sees those of that machine. A part is found by an index. By any other condition without a characteristic the
+    readings are looked through in their order until the page is full: what is rare in millions of them is found faster within a period.
     """
     entry = entry_for(session, caller, characteristic) if characteristic is not None else None
     machine_id = only_machine(session, caller, machine)
