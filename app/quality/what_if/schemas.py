@@ -95,10 +95,16 @@ class SampledIn(WhatIfIn):
     ]
     after_change: Annotated[
         Few | None,
-        Field(description="Every part is measured for N readings after a tool change; null: as the control plan says."),
+        Field(
+            description="Every part is measured for N readings after a tool change; the beginning of the period and an offset set by "
+            "hand count as one. null: as the control plan says."
+        ),
     ] = None
     after_alarm: Annotated[
-        Few | None, Field(description="The same after an alarm by a reading; null: as the control plan says.")
+        Few | None,
+        Field(
+            description="The same after an alarm that a reading of this characteristic raises; null: as the control plan says."
+        ),
     ] = None
 
 
