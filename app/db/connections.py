@@ -90,6 +90,7 @@ class Connections:
         self.age = 0
         """Rises when connections made before are of no use any more."""
         self._parameters = parameters_of(url, patience, of_several)
+        self._first: tuple[str, int] | None = None  # host and port of the first connection that was made
         self._ending = threading.Event()
         self._thread: threading.Thread | None = None
 
@@ -121,6 +122,7 @@ class Connections:
         """Make a connection that does not wait for a silent database. Raises `OperationalError`, at once if it is silent."""
         age = self._heard()
         connection = WatchedConnection.connect(**self._for(options, more))
+        self._first = self._first or (connection.info.host, connection.info.port)
         connection.born(self, age)
         return connection
 
@@ -132,6 +134,7 @@ class Connections:
                 connection = await WatchedAsyncConnection.connect(autocommit=True, **self._for(options, more))
         except TimeoutError:
             raise OperationalError("no connection to the database could be made in time") from None
+        self._first = self._first or (connection.info.host, connection.info.port)
         connection.born(self, age)
         return connection
 
@@ -155,7 +158,7 @@ class Connections:
 
     def _watch(self) -> None:
         connection: _Asking | None = None
-        server: object = None
+        server: tuple[str, int, object] | None = None
         pause = interval = self.patience / 5
         while not self._ending.wait(pause):
             since = time.monotonic()
@@ -173,7 +176,9 @@ class Connections:
                 pause = interval / 5
                 continue
             answered = (connection.info.host, connection.info.port, row)
-            if server not in {None, answered}:
+            # A host may be gone before it is asked for the first time: connections are waiting for it then.
+            replaced = server != answered if server else self._first not in {None, answered[:2]}
+            if replaced:
                 log.warning("another database server answers now: %s port %s", *answered[:2])
                 self.age += 1
             server, pause = answered, interval

@@ -12,9 +12,11 @@ from typing import Any
 import httpx
 import psycopg
 import pytest
+from psycopg.errors import OperationalError
 
 from app.db import migrate
 from app.db.binaries import binary
+from app.db.connections import Connections
 from app.db.embedded import EmbeddedServer
 from app.db.engine import Database
 from tests.conftest import RunServer, Server
@@ -154,6 +156,16 @@ def test_the_server_ends_in_order_while_the_database_says_nothing(
         assert inband.stop() == 0
     inband.restart()
     assert until_taken(shop).status_code in {200, 201}
+
+
+def test_a_host_that_is_gone_before_the_first_look_keeps_nobody_waiting(ours: EmbeddedServer) -> None:
+    with Way(socket_of(ours)) as first, Way(socket_of(ours)) as second:
+        connections = Connections(f"postgresql://inband@127.0.0.1:{first.port},127.0.0.1:{second.port}/inband", 2)
+        with connections.connect() as connection:
+            assert connection.info.port == first.port
+            first.swallow()
+            with connections, pytest.raises(OperationalError, match="was replaced by another"):
+                connection.execute("SELECT 1")
 
 
 def test_a_commit_that_waits_for_its_standby_is_not_waited_for_and_not_cancelled(
