@@ -23,14 +23,18 @@ def _of_characteristic(table: str, name: str) -> str:
 
 
 FEATURES = f"SELECT m.key AS machine, t.feature FROM form_measurement t {OF_MACHINE} ORDER BY t.id"  # noqa: S608
+CORRECTIONS = (
+    f"SELECT m.key AS machine, t.number FROM correction t {OF_MACHINE} "  # noqa: S608
+    "ORDER BY t.status IN ('held', 'awaiting_approval', 'pending'), m.id, 2"
+)
 
 # What stands for the names of an address, by what the address has in it; the first that fits counts.
 KNOWN = (
     ("{machine}/tools/{tool}", _of_machine("tool", "tool", "number")),
     ("{machine}/tools/{number}", _of_machine("tool", "number", "number")),
     ("/corrections/{machine}/tools/{tool}", _of_machine("correction", "tool", "tool_memory")),
-    ("/corrections/{machine}/{number}", _of_machine("correction", "number", "number")),
-    ("{machine}/corrections/{number}", _of_machine("correction", "number", "number")),
+    ("/corrections/{machine}/{number}", CORRECTIONS),
+    ("{machine}/corrections/{number}", CORRECTIONS),
     (
         "/averages/{location}/pairs/{pair}",
         f"SELECT m.key AS machine, t.location, t.id AS pair FROM paired_reading t {OF_MACHINE} ORDER BY 3",  # noqa: S608
@@ -54,7 +58,10 @@ KNOWN = (
     ("/alarms/{number}/photos/{photo}", "SELECT alarm_id AS number, id AS photo FROM alarm_photo ORDER BY 2"),
     ("{quarantine}/parts/{number}", "SELECT quarantine_id AS quarantine, number FROM quarantined_part ORDER BY 1, 2"),
     ("{number}/parts/{part}", "SELECT quarantine_id AS number, number AS part FROM quarantined_part ORDER BY 1, 2"),
-    ("/station/{machine}/alarms/{number}", _of_machine("alarm", "number", "id")),
+    (
+        "/station/{machine}/alarms/{number}",
+        f"SELECT m.key AS machine, t.id AS number FROM alarm t {OF_MACHINE} WHERE t.acknowledged_at IS NULL ORDER BY t.id",  # noqa: S608
+    ),
     ("/alarms/{alarm}", "SELECT id AS alarm FROM alarm ORDER BY acknowledged_at IS NULL, 1"),
     ("/alarms/{number}", "SELECT id AS number FROM alarm ORDER BY acknowledged_at IS NULL, 1"),
     ("/quarantines/{number}", _numbered("quarantine", "number")),

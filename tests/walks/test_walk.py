@@ -80,7 +80,7 @@ def walking(house: InProcess, seed: int) -> Iterator[Walker]:
         sys.stdout.write(f"seed {seed}, {walker.steps} steps: {walker.summary()}\n")
 
 
-def walk(house: InProcess, seed: int, steps: int, seconds: float = 1e9) -> None:
+def walk(house: InProcess, seed: int, steps: int, seconds: float = 1e9) -> Walker:
     """So many steps, as long as there is time."""
     end = time.monotonic() + seconds
     with walking(house, seed) as walker:
@@ -89,6 +89,7 @@ def walk(house: InProcess, seed: int, steps: int, seconds: float = 1e9) -> None:
             if walker.steps % 20 == 0:
                 checked(house, walker)
         checked(house, walker)
+    return walker
 
 
 def test_every_act_is_walked() -> None:
@@ -111,7 +112,10 @@ def test_a_short_walk(plant: InProcess) -> None:
 def test_a_long_walk(plant: InProcess) -> None:
     Place(plant)  # with something of everything
     furnish(plant)
-    walk(plant, chance.seed(1), 3000, 150)
+    walker = walk(plant, chance.seed(1), 3000, 300)
+    corrections, tools = "/api/v1/corrections/{machine}/{number}", "/api/v1/machines/{machine}/tools/{tool}"
+    alarms = "POST /api/v1/alarms/{alarm}/acknowledge"
+    assert {alarms, f"POST {corrections}/applied", f"POST {tools}/change", f"PUT {tools}"} <= walker.done()
 
 
 @pytest.mark.long

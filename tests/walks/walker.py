@@ -48,6 +48,7 @@ OPENED = (
     *(f"/quarantines/{{number}}/parts/{{part}}/{what}" for what in ("measure", "release", "scrap")),
     "/calibration/{machine}/averages/{location}",
 )
+NUMBERS = ("part", "pallet", "cause")  # are words in other bodies
 CHANGES: tuple[dict[str, Any], ...] = (
     {"mode": "approval"},
     {"mode": "automatic"},
@@ -182,28 +183,35 @@ class Walker:
 
     def body(self, operation: Operation, values: dict[str, Any]) -> Any:
         """A body that may be a good one now."""
+        if operation.path.endswith("/alarms/{alarm}/acknowledge"):
+            return self.acknowledgement(values)
         chance, schema = self.chance, body_schema(operation)
         declared, required = schema.get("properties", {}), schema.get("required", ())
         given = dict(BODIES[operation.name])
         for name, given_kind in declared.items():
-            if name in LOOKED_UP and (name in given or chance.random() < 0.4):
-                given[name] = self.looked_up(name, values)
-                continue
             if name not in given:
                 continue
+            if name in LOOKED_UP and not isinstance(given[name], str if name in NUMBERS else dict):
+                given[name] = self.looked_up(name, values)
+                continue
             kind = resolved(given_kind)
-            if name not in required and chance.random() < 0.15:
+            if name not in required and chance.random() < 0.05:
                 del given[name]
-            elif kind.get("enum") and chance.random() < 0.5:
+            elif kind.get("enum") and chance.random() < 0.2:
                 given[name] = chance.choice(kind["enum"])
-            elif kind.get("type") == "boolean" and chance.random() < 0.4:
+            elif kind.get("type") == "boolean" and chance.random() < 0.2:
                 given[name] = not given[name]
             elif name == "key":
                 given[name] = f"key-{chance.randrange(10_000)}"
             elif name.startswith("seen_"):
                 del given[name]
-            elif name.endswith("_at") and isinstance(given[name], str):
+            elif name.endswith("_at") and name != "machined_at" and isinstance(given[name], str):
                 given[name] = datetime.now(UTC).isoformat()
+        if "machine" in given and isinstance(given.get("characteristic"), str):
+            machine = "SELECT m.key FROM machine m JOIN characteristic c ON c.machine_id = m.id WHERE c.key = '{}'"
+            given["machine"] = next(self.record.numbers(machine.format(given["characteristic"])), given["machine"])
+        if "reference" in given and "/fixtures/" not in operation.path:
+            given["reference"] = 40.0
         if operation.path.endswith("/aqdef"):
             given["content"] = given["content"].format(characteristic=self.looked_up("characteristic", values))
         if "parameters" in given:
@@ -213,6 +221,21 @@ class Walker:
                 {"reason": "Tried"} if operation.path.endswith("/proposals") else {}
             )
         return given
+
+    def acknowledgement(self, values: dict[str, Any]) -> dict[str, Any]:
+        """An answer to an alarm, with what goes with it."""
+        action = self.chance.choice(ACTIONS)
+        body: dict[str, Any] = {"action": action, "comment": "Looked at"}
+        if action in {"tool_replaced", "offset_set"}:
+            body["offset"] = self.looked_up("offset", values)
+        if action == "offset_set":
+            body["changed_by"] = "Anna"
+        if action == "measured_by_hand":
+            body |= {"hand_measured": 40.001, "hand_verdict": self.chance.choice(("good", "bad"))}
+        for name in ("cause", "corrective_action"):
+            if self.chance.random() < 0.7:
+                body[name] = self.looked_up(name, values)
+        return body
 
     def looked_up(self, name: str, values: dict[str, Any]) -> Any:
         """Something of the record that may stand in the field; several where it takes a list."""
@@ -249,9 +272,12 @@ class Walker:
             url = operation.path.format(**({"form": "csv"} | values))
             self._answered(operation.name, "", self.api.get(url))
 
+    def done(self) -> set[str]:
+        """Names of what was not refused."""
+        return {name for name, kind in self.answers if kind in {2, 3}}
+
     def summary(self) -> str:
         """What was done how often, and what was never done."""
-        done = {name for (name, kind), _ in self.answers.items() if kind in {2, 3}}
         tried = {name for name, _ in self.answers}
         counts = Counter(kind for (_, kind), n in self.answers.items() for _ in range(n))
-        return f"{dict(counts)}\nnever done: {sorted(tried - done)}"
+        return f"{dict(counts)}\nnever done: {sorted(tried - self.done())}"
