@@ -131,8 +131,8 @@ def contradictions(database: sqlite3.Connection, machine: str, received: Sequenc
             f"Key {each.key} came with {known} before, and with {size} now: one of the two is wrong, or the machine counts"
             " again what it had counted."
         )
-        told = size if not isinstance(size, list) else hashlib.sha256(json.dumps(size).encode()).hexdigest()[:16]
-        row = (machine, f"{each.key}:{told}", json.dumps(each.body), "quarantined", reason[:MOST_REASON], now)
+        written = size if not isinstance(size, list) else hashlib.sha256(json.dumps(size).encode()).hexdigest()[:16]
+        row = (machine, f"{each.key}:{written}", json.dumps(each.body), "quarantined", reason[:MOST_REASON], now)
         database.execute(ADD, row)
         refused[place] = reason[:MOST_REASON]
     return Added(database.total_changes - before, refused)

@@ -20,7 +20,7 @@ Role = Literal[
     "stop",  # probe fault, machine stopped
     "waiting",  # waits for a person or for the machine
     "correction",  # corrections and offsets
-    "mended",  # measured again after a correction
+    "corrected",  # measured again after a correction
     "band-0",  # behind the readings, from the target outward
     "band-1",
     "band-2",
@@ -56,7 +56,7 @@ PALETTES: dict[ThemeName, Palette] = {
         "stop": "#c00f1e",
         "waiting": "#155fa8",
         "correction": "#155fa8",
-        "mended": "#1a7a3c",
+        "corrected": "#1a7a3c",
         "band-0": "#fbfbfa",
         "band-1": "#f0f2f2",
         "band-2": "#e4e7e8",
@@ -77,7 +77,7 @@ PALETTES: dict[ThemeName, Palette] = {
         "stop": "#ff6b6b",
         "waiting": "#74b6f2",
         "correction": "#74b6f2",
-        "mended": "#62c985",
+        "corrected": "#62c985",
         "band-0": "#1b2024",
         "band-1": "#22282d",
         "band-2": "#2b3238",

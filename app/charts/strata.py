@@ -12,7 +12,7 @@ LOOKS: tuple[tuple[Colour, str], ...] = (
     ("correction", "square"),
     ("wear", "diamond"),
     ("attention", "triangle-up"),
-    ("mended", "cross"),
+    ("corrected", "cross"),
     ("ink", "star"),
 )
 NONE: tuple[Colour, str] = ("faint", "circle")

@@ -128,15 +128,19 @@ def missing(connection: psycopg.Connection[Any], schemas: Sequence[str]) -> list
     """Lacks of the cluster that is to hold these schemas of plants, and what to do; empty without Citus."""
     if version(connection) is None:
         return []
-    known, told = nodes(connection), []
+    known, remarks = nodes(connection), []
     if len(known) < 2:
-        told.append("there is no other node. As a superuser: SELECT citus_add_node('HOST', PORT)")
+        remarks.append("there is no other node. As a superuser: SELECT citus_add_node('HOST', PORT)")
     for host, port, answers, lacks in connection.execute(_SETTINGS):
         if not answers:
-            told.append(f"{Node(host, port)} does not answer, so its plants are stopped; the others go on: {lacks}")
+            remarks.append(f"{Node(host, port)} does not answer, so its plants are stopped; the others go on: {lacks}")
         elif lacks:
-            told.append(f"no plant can be moved from or to {Node(host, port)}: set {lacks} there, and start it again")
+            remarks.append(
+                f"no plant can be moved from or to {Node(host, port)}: set {lacks} there, and start it again"
+            )
     here = [schema for schema in schemas if node_of(connection, schema) is None]
     if len(known) > 1 and here:
-        told.append(f"not distributed: {', '.join(here)}. `inband plant move PLANT HOST:PORT` takes a plant to a node")
-    return told
+        remarks.append(
+            f"not distributed: {', '.join(here)}. `inband plant move PLANT HOST:PORT` takes a plant to a node"
+        )
+    return remarks

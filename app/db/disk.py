@@ -50,7 +50,7 @@ def _watch(data_dir: Path) -> None:
         try:
             words = shortage(data_dir)
         except OSError as error:
-            words = f"The room on the disk of {data_dir} cannot be told: {error}"
+            words = f"The room on the disk of {data_dir} cannot be read: {error}"
         if words is None:
             warned_at = None
         elif warned_at is None or time.monotonic() - warned_at >= SAY_EVERY:

@@ -6,8 +6,8 @@ from app.charts.scales import Scale
 
 
 def test_a_hollow_marker_is_seen_in_the_legend() -> None:
-    dots = Dots("square", 9, "surface", "mended", 2)
-    chart = Chart([Panel([Series([0, 90], [1, 2], Pen("mended"), dots, name="optimised")])])
+    dots = Dots("square", 9, "surface", "corrected", 2)
+    chart = Chart([Panel([Series([0, 90], [1, 2], Pen("corrected"), dots, name="optimised")])])
     squares = [
         mark
         for group in to_drawing(chart, 400, 200).groups

@@ -224,9 +224,9 @@ class Context:
         if self.trouble:
             return self.trouble
         known = ", ".join(f"{name} {value[:60]}" for name in ELEMENTS if (value := self.values.get(name)))
-        told = f"MTConnect: {known or 'program, tool and part are unavailable'}."
+        known_of_it = f"MTConnect: {known or 'program, tool and part are unavailable'}."
         recent = self._gap is not None and datetime.now(UTC) - self._gap[0] < GAP_SHOWN
-        return " ".join([told, *self.unclear, *([self._gap[1]] if recent and self._gap else [])])
+        return " ".join([known_of_it, *self.unclear, *([self._gap[1]] if recent and self._gap else [])])
 
     def lacking(self) -> tuple[list[str], list[str]]:
         """Names without a data item at the device, and those whose data item is UNAVAILABLE, once the agent has answered."""

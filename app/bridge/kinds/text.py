@@ -167,13 +167,13 @@ class TextLink:
         except Unreadable as error:
             return self._refused(line, f"{field} {value[:40]!r} {error}.")
         if "key" in fields:
-            told = [fields["key"], name]
+            parts = [fields["key"], name]
         elif body.keys() & {"measured_at", "machined_at", "part"}:
-            told = [name, json.dumps(body, sort_keys=True)]
+            parts = [name, json.dumps(body, sort_keys=True)]
         else:
-            told = [uuid.uuid4().hex]
+            parts = [uuid.uuid4().hex]
         body.setdefault("measured_at", now.isoformat())
-        return Received(f"{self.machine.key}:text:{_digest(told)}", body)
+        return Received(f"{self.machine.key}:text:{_digest(parts)}", body)
 
     def _refused(self, line: Line, reason: str) -> Received:
         key = f"{self.machine.key}:refused:{_digest([line.text, str(time.time_ns())])}"
@@ -207,8 +207,8 @@ class TextLink:
         return {}
 
 
-def _digest(told: Sequence[str]) -> str:
-    return hashlib.sha256("\0".join(told).encode("utf-8", "replace")).hexdigest()[:32]
+def _digest(parts: Sequence[str]) -> str:
+    return hashlib.sha256("\0".join(parts).encode("utf-8", "replace")).hexdigest()[:32]
 
 
 def link(machine: Machine) -> TextLink:

@@ -63,13 +63,13 @@ class Feed:
 
 def _event(kind: str, event_id: int | None, data: str) -> Event:
     try:
-        told: Any = json.loads(data)
+        content: Any = json.loads(data)
     except ValueError:
-        told = None
+        content = None
     said = {"kind": kind, "event_id": event_id}
-    if not isinstance(told, dict):
+    if not isinstance(content, dict):
         return Event(kind=kind, event_id=event_id)
     try:
-        return read(Event, told | said)
+        return read(Event, content | said)
     except Unreadable:  # a field has another type than today: it is reported all the same
-        return Event(kind=kind, event_id=event_id, extra=told)
+        return Event(kind=kind, event_id=event_id, extra=content)

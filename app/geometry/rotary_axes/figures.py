@@ -30,7 +30,7 @@ from app.charts import (
 from app.geometry.rotary_axes.drift import Compared, Drift
 from app.geometry.rotary_axes.result_values import UNITS, as_reading
 from app.geometry.rotary_axes.wording import difference, name_words
-from app.geometry.rotary_axes.wording import entered as told
+from app.geometry.rotary_axes.wording import entered as in_words
 from app.language.i18n import _
 
 LETTERS = "XYZ"
@@ -49,7 +49,7 @@ def diagram(axis: Mapping[str, Any], letter: str, *, height: float = 0.0) -> Cha
     marks: list[Series] = []
     for kind, words, pen in (
         ("measured", _("measured"), Pen("stop", 2)),
-        ("optimised", _("optimised"), Pen("mended", 2, "dash")),
+        ("optimised", _("optimised"), Pen("corrected", 2, "dash")),
     ):
         for approach in sorted({position["approach"] for position in axis["positions"]}, reverse=True):
             chosen = sorted(
@@ -113,7 +113,7 @@ def comparison(changes: Sequence[Compared], entered: Mapping[str, float]) -> Cha
         marks.append(Series([before[row], after[row]], [row, row], pen))
         words = [_moved(change)]
         if (enter := entered.get(change.name)) is not None:
-            words.append(bold(_("enter {value}").format(value=told(change.name, enter))))
+            words.append(bold(_("enter {value}").format(value=in_words(change.name, enter))))
         marks.append(Note(" · ".join(words), Share(1), row, "right", size=14, colour="ink"))
     for name, values, symbol in ((_("then"), before, "circle-open"), (_("now"), after, "diamond")):
         # The points have the colour of what they mean, so the legend has a mark of its own.

@@ -105,7 +105,7 @@ def _due(session: Session, silent_after: timedelta) -> Select[Any]:
 
 
 def _begun(name: str, condition: ColumnElement[bool], since: Any) -> Select[int, str, str, str]:
-    told = select(Alarm.id).where(
+    raised = select(Alarm.id).where(
         Alarm.machine_id == Connection.machine_id,
         Alarm.characteristic_id.is_(None),
         Alarm.kind == name,
@@ -114,7 +114,7 @@ def _begun(name: str, condition: ColumnElement[bool], since: Any) -> Select[int,
     return (
         select(Machine.id, Machine.key.label("machine"), value(name).label("kind"), value("raise").label("verb"))
         .join(Connection, Connection.machine_id == Machine.id)
-        .where(condition, ~told.exists())
+        .where(condition, ~raised.exists())
     )
 
 

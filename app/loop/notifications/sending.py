@@ -212,8 +212,8 @@ def _of_plans(session: Session) -> list[Route]:
 
 
 def _alarm_job(session: Session, row: Receiver, notice: Notice, address: str) -> Job:
-    told: list[AlarmRow] = [alarm(session, number) for number in notice.alarms[: message.MOST_IN_WORDS]]
-    made = message.of_alarms(told, len(notice.alarms), notice.again, address)
+    listed: list[AlarmRow] = [alarm(session, number) for number in notice.alarms[: message.MOST_IN_WORDS]]
+    made = message.of_alarms(listed, len(notice.alarms), notice.again, address)
     return _job(session, row, "alarms", made, alarms=notice.alarms)
 
 

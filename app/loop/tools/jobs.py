@@ -162,11 +162,11 @@ def tell_gain(session: Session, unit: Unit) -> None:
     """A gain that is credibly nearer to a half or to 2 than to 1 raises *unusual gain*, once until it is answered."""
     machine_id, number = (int(part) for part in unit.key)
     machine = session.get_one(Machine, machine_id)
-    told = [each for each in gain_queries.gains(session, machine, number) if each.gain and each.gain.verdict]
-    if not told:
+    credible = [each for each in gain_queries.gains(session, machine, number) if each.gain and each.gain.verdict]
+    if not credible:
         return
     lock_machines(session, [machine_id])
-    for characteristic_id, key, factor, gain in told:
+    for characteristic_id, key, factor, gain in credible:
         if gain is None or gain.verdict is None or alarms.active(session, machine_id, characteristic_id, UNUSUAL_GAIN):
             continue
         data = {

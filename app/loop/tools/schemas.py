@@ -263,8 +263,8 @@ def _brief(c: Correction) -> CorrectionBrief:
 
 def tool_out(row: ToolRow, machine: str, gains: Sequence[ToolGain] | None = None) -> ToolOut:
     """A location of the tool memory as it is answered."""
-    told = None if gains is None else [_gain(each) for each in gains]
-    return ToolOut.model_validate(_tool(row, machine) | {"gains": told})
+    shown = None if gains is None else [_gain(each) for each in gains]
+    return ToolOut.model_validate(_tool(row, machine) | {"gains": shown})
 
 
 def _gain(of: ToolGain) -> dict[str, Any]:

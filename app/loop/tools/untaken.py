@@ -98,18 +98,18 @@ class Watch:
 
     def _found(self, session: Session) -> list[tuple[int, str, int, str]]:
         waiting = untaken(session)
-        told_of: list[ColumnElement[bool]] = [Alarm.acknowledged_at.is_(None)]
+        conditions: list[ColumnElement[bool]] = [Alarm.acknowledged_at.is_(None)]
         if waiting:
-            told_of.append(Alarm.raised_at >= min(each.since for each in waiting))
-        told = (
+            conditions.append(Alarm.raised_at >= min(each.since for each in waiting))
+        raised = (
             select(Alarm, Machine.key)
             .join(Machine, Machine.id == Alarm.machine_id)
-            .where(Alarm.kind == CORRECTIONS_NOT_TAKEN.name, or_(*told_of))
+            .where(Alarm.kind == CORRECTIONS_NOT_TAKEN.name, or_(*conditions))
             .order_by(Alarm.id)
             .execution_options(populate_existing=True)
         )
         recent: dict[tuple[int, int], tuple[Alarm, str]] = {}
-        for alarm, machine in session.execute(told):
+        for alarm, machine in session.execute(raised):
             recent[alarm.machine_id, alarm.tool_memory or 0] = alarm, machine
         found = []
         for each in waiting:
