@@ -1,4 +1,5 @@
 import re
+from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 from typing import Any
 
@@ -145,17 +146,21 @@ def test_the_first_program_gets_its_database_back(first_program: str) -> None:
 
 
 def test_each_migration_goes_there_and_back_with_the_rows_of_the_first_program(first_program: str) -> None:
-    before, steps = rows_of(first_program), [line.split()[0] for line in migrate.upgrade(first_program)]
+    before, steps = rows_of(first_program), migrate.upgrade(first_program)
     at_head = rows_of(first_program)
-    for revision in ["0100", *steps][-2::-1]:
-        (undone,) = migrate.downgrade(first_program, revision)
-        assert migrate.current(first_program) == revision
-        there = rows_of(first_program)
-        assert undone in migrate.upgrade(first_program)
-        assert rows_of(first_program) == at_head, undone
-        migrate.downgrade(first_program, revision)
-        assert rows_of(first_program) == there, undone
-    assert there == before
+
+    def back() -> Iterator[tuple[str, Rows]]:
+        for revision, name in zip(["0100", *(line.split()[0] for line in steps)][-2::-1], steps[::-1], strict=True):
+            assert migrate.downgrade(first_program, revision) == [name]
+            assert migrate.current(first_program) == revision
+            yield name, rows_of(first_program)
+
+    there = dict(back())
+    assert there[steps[0]] == before
+    assert migrate.upgrade(first_program) == steps
+    assert rows_of(first_program) == at_head
+    for undone, rows in back():
+        assert rows == there[undone], undone
 
 
 def test_the_way_back_is_gone_as_a_whole_or_not_at_all(first_program: str) -> None:

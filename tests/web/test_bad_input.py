@@ -986,7 +986,7 @@ def test_it_is_the_same_through_a_socket(server: Server) -> None:
         refused_and_nothing_stored(attempt, [operation_named(name)], place)
 
 
-@pytest.mark.parametrize("turn", [0, *(pytest.param(turn, marks=pytest.mark.long) for turn in (1, 2))])
+@pytest.mark.parametrize("turn", [0, *(pytest.param(turn, marks=pytest.mark.long) for turn in range(1, SHARES))])
 def test_what_all_this_was_tried_on_can_be_done(new_database: NewDatabase, turn: int) -> None:
     """The bodies above are good ones: what was refused was refused for what was changed in them."""
 
@@ -1001,7 +1001,7 @@ def test_what_all_this_was_tried_on_can_be_done(new_database: NewDatabase, turn:
     url, wrong = new_database(), []
     with in_process(url) as house:
         places: list[Place] = []
-        for name in list(BODIES)[turn::3]:
+        for name in list(BODIES)[turn::SHARES]:
             operation, answer = operation_named(name), None
             for number in itertools.count():  # what was done at one place before may stand in the way there
                 fresh = number == len(places)
