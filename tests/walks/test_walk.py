@@ -10,6 +10,7 @@ from typing import Any
 
 import pytest
 
+from app.jobs.runner import JobRunner
 from tests import chance
 from tests.conftest import NewDatabase, drop_database
 from tests.in_process import InProcess, in_process
@@ -23,8 +24,10 @@ from tests.web.test_bad_input import BODIES, REACTION, Place, operations
 @pytest.fixture
 def plant(new_database: NewDatabase) -> Iterator[InProcess]:
     url = new_database()
-    with in_process(url, bridge_silent_after=86_400) as house:
-        yield house
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(JobRunner, "start", lambda _runner: None)  # walkers run its jobs
+        with in_process(url, bridge_silent_after=86_400) as house:
+            yield house
     drop_database(url)
 
 

@@ -5,6 +5,7 @@ the moment, choices are made anew, and what need not be said is left out now and
 """
 
 import random
+import threading
 from collections import Counter, deque
 from datetime import UTC, datetime, timedelta
 from typing import Any
@@ -20,6 +21,8 @@ from tests.shop import PARAMETERS, Person
 from tests.walks.addresses import Record
 from tests.walks.forms import forms
 from tests.web.test_bad_input import BODIES, Operation, body_schema, operations, resolved
+
+ONE_AT_A_TIME = threading.Lock()  # of all processes of a plant one runs the periodic jobs
 
 WITHOUT_BODY = {
     "DELETE /api/v1/machines/{machine}/connection",
@@ -123,7 +126,8 @@ class Walker:
         elif way < 0.97:
             self.form(self.chance.choice(OPENED))
         else:
-            run_jobs(self.server.database, JOBS)
+            with ONE_AT_A_TIME:
+                run_jobs(self.server.database, JOBS)
             self.trail.append("jobs")
 
     def _answered(self, name: str, what: Any, answer: httpx.Response) -> httpx.Response:
