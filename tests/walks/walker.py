@@ -121,6 +121,8 @@ class Walker:
         way = self.chance.random()
         if way < 0.35:
             self.read()
+        elif way < 0.43:
+            self.answer()
         elif way < 0.75:
             self.act(self.chance.choices(self.operations, self.weights)[0])
         elif way < 0.97:
@@ -225,6 +227,22 @@ class Walker:
                 {"reason": "Tried"} if operation.path.endswith("/proposals") else {}
             )
         return given
+
+    def answer(self) -> None:
+        """Acknowledge an alarm that waits; a tool that is to be switched has a sister then."""
+        alarm = self.record.chosen(
+            "SELECT t.id AS alarm, m.key AS machine, t.tool_memory AS tool FROM alarm t JOIN machine m ON m.id = t.machine_id "
+            "WHERE t.acknowledged_at IS NULL ORDER BY t.id"
+        )
+        if alarm is None:
+            return
+        body = self.acknowledgement(alarm)
+        if body["action"] == "sister_tool" and alarm["tool"]:
+            url = "/api/v1/machines/{machine}/tools/{tool}".format(**alarm)
+            sister = {"sister": 3 if alarm["tool"] == 13 else 13}
+            self._answered("sister", sister, self.api.patch(url, json=sister))
+        path = "/api/v1/alarms/{alarm}/acknowledge"
+        self._answered(f"POST {path}", body, self.api.post(path.format(**alarm), json=body))
 
     def acknowledgement(self, values: dict[str, Any]) -> dict[str, Any]:
         """An answer to an alarm, with what goes with it."""
