@@ -175,6 +175,18 @@ class TestPlantOnANode:
         assert (alarm["count"], alarm["last_sequence"]) == (2, 2)
         assert alarm["last_at"] == answer.json()["received_at"]
 
+    def test_context_is_kept_there_and_filled_in(self, client: httpx.Client, server: Server) -> None:
+        seat = seat_of(client, "work")
+        machine = client.get(f"/api/v1/characteristics/{seat}").json()["machine"]
+        for sent in ({"order": "A-1"}, {"part_temperature": 21.5}, None):
+            assert client.put(f"/api/v1/machines/{machine}/context", json={"order": "A-2"}).status_code == 200
+            body = {"characteristic": seat, "measured": 40.001} | ({"context": sent} if sent else {})
+            assert client.post("/api/v1/readings", json=body).status_code == 201
+        client.put(f"/api/v1/machines/{machine}/context", json={}).raise_for_status()  # the old one is put on first
+        found = [client.get(f"/api/v1/readings/{seat}/{sequence}").json()["context"] for sequence in (1, 2, 3)]
+        assert [context["order"] for context in found] == ["A-1", "A-2", "A-2"]
+        assert found[1]["part_temperature"] == 21.5
+
     @pytest.mark.parametrize(
         "path",
         [

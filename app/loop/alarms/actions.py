@@ -37,7 +37,7 @@ def _raised(session: Session, alarm: Alarm, data: dict[str, Any]) -> Alarm:
     """A new alarm is kept; on one that is active already, one more is counted."""
     if alarm in session:
         alarm.count += 1
-        alarm.last_at = datetime.now(UTC)
+    alarm.last_at = datetime.now(UTC)
     alarm.data = data
     session.add(alarm)
     session.flush()

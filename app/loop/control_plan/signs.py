@@ -154,6 +154,7 @@ def runs(session: Session, row: ControlPlan, own: Characteristic, since: float) 
             Stream.last_measured_at > moment,
             Reading.sequence > Stream.sequence - MOST,
             Reading.measured_at > moment,
+            Reading.received_at > moment,
         )
     )
     first, more = session.execute(another_part).one()

@@ -25,12 +25,14 @@ UNDER_WAY = timedelta(minutes=2)
 """Readings that came so lately may not be stored yet: they are looked at again."""
 
 _FILL = text("""
-INSERT INTO reading_context (machine_id, characteristic_id, sequence, context)
+WITH made AS MATERIALIZED (
 SELECT r.machine_id, r.characteristic_id, r.sequence, p.context FROM present_context p
 JOIN reading r ON r.machine_id = p.machine_id AND r.received_at >= p.filled
 WHERE p.machine_id = :machine AND p.context <> '{}' AND r.measured_at >= p.since AND r.code <> :imported AND NOT EXISTS (
     SELECT FROM reading_context c WHERE c.machine_id = r.machine_id AND c.characteristic_id = r.characteristic_id
         AND c.sequence = r.sequence)
+)
+INSERT INTO reading_context (machine_id, characteristic_id, sequence, context) SELECT * FROM made
 ON CONFLICT DO NOTHING
 """)
 

@@ -27,7 +27,7 @@ class PresentContextIn(Body):
 
 
 class PresentContextOut(BaseModel):
-    """The work of a machine, put within a minute on its readings that bring no context of their own."""
+    """The work of a machine, put within a minute on its readings that bring no context but temperatures."""
 
     machine: str
     context: Annotated[PresentContextIn, Field(description="As it was set; null is not known.")]

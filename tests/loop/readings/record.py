@@ -87,9 +87,9 @@ BROKEN = (
            ORDER BY id DESC LIMIT 1) e ON true WHERE abs(t."offset" - e.offset_after) > 1e-9""",
     """SELECT c.machine_id, c.number, count(e.id) FROM correction c LEFT JOIN tool_event e
            ON e.machine_id = c.machine_id AND e.correction = c.number
-       GROUP BY c.machine_id, c.number, c.status HAVING count(e.id) - (count(e.id) = 2 AND EXISTS (
+       GROUP BY c.machine_id, c.number, c.tool_memory, c.status HAVING count(e.id) - (count(e.id) = 2 AND EXISTS (
            -- the machine named another offset for what a reading had confirmed
-           SELECT FROM alarm a WHERE a.machine_id = c.machine_id AND a.kind = 'offset_differs'
+           SELECT FROM alarm a WHERE a.machine_id = c.machine_id AND a.tool_memory = c.tool_memory AND a.kind = 'offset_differs'
        ))::int <> (c.status = 'applied')::int""",
     # one active alarm for one trouble, counted as often as readings name it
     """SELECT machine_id, characteristic_id, kind FROM alarm

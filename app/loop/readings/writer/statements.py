@@ -221,12 +221,15 @@ INSERT INTO reading_touches (machine_id, characteristic_id, sequence, touches)
 SELECT * FROM json_to_recordset($1) AS r(machine_id int, characteristic_id int, sequence bigint, touches jsonb)
 """
 # A sensor's temperatures say nothing of the work: beside them the reading gets what the machine works at, as it does without them.
+# Made first, then inserted, as in `SUMMARISE_READINGS`.
 CONTEXT = """
-INSERT INTO reading_context (machine_id, characteristic_id, sequence, context)
-SELECT r.machine_id, r.characteristic_id, r.sequence, coalesce(p.context, '{}') || r.context
+WITH made AS MATERIALIZED (
+SELECT r.machine_id, r.characteristic_id, r.sequence, coalesce(p.context, '{}') || r.context AS context
 FROM json_to_recordset($1) AS r(machine_id int, characteristic_id int, sequence bigint, measured_at timestamptz, context jsonb)
 LEFT JOIN present_context p ON p.machine_id = r.machine_id AND r.measured_at >= p.since
     AND r.context - '{part_temperature,machine_temperature}'::text[] = '{}'
+)
+INSERT INTO reading_context (machine_id, characteristic_id, sequence, context) SELECT * FROM made
 """
 _RESULTS = """machine_id int, characteristic_id int, sequence bigint, run_out float8, out_of_roundness float8, taper float8,
     slope float8, repeat_range float8, repeat_deviation float8, sections_outside smallint, rejected bool, straightness float8"""
@@ -284,7 +287,7 @@ SELECT * FROM json_to_recordset($1) AS r(machine_id int, id bigint, kind text, c
 """
 # The sentence tells the newest reading, as the correction that is held does; a tool's alarm keeps the one that raised it.
 REPEAT = """
-UPDATE alarm a SET count = a.count + n.count, last_at = n.last_at, last_sequence = n.last_sequence,
+UPDATE alarm a SET count = a.count + n.count, last_at = greatest(a.last_at, n.last_at), last_sequence = n.last_sequence,
     data = CASE WHEN a.characteristic_id IS NULL THEN a.data ELSE n.data END
 FROM json_to_recordset($1) AS n(machine_id int, id bigint, count int, last_sequence bigint, last_at timestamptz,
     data jsonb)
