@@ -108,6 +108,21 @@ def um(deviation_mm: float | None, decimals: int = 1) -> str:
     return NOTHING if deviation_mm is None else f"{in_um(deviation_mm, decimals)}{NO_BREAK_SPACE}µm"
 
 
+def read_um(deviation_mm: float | None, half_mm: float | None) -> str:
+    r"""A deviation in µm with the decimals that its tolerance deserves; one where the tolerance is not known.
+
+    half_mm: as of `deserved`; what is not zero has a decimal rather than be read as zero.
+
+    >>> read_um(-0.406575, 0.3), read_um(0.0061, 0.008), read_um(0.0004, 0.3), read_um(0.0061, None)
+    ('−407\xa0µm', '+6.1\xa0µm', '+0.4\xa0µm', '+6.1\xa0µm')
+    """
+    if deviation_mm is None or half_mm is None:
+        return um(deviation_mm)
+    decimals = deserved(half_mm, deviation_mm)
+    reads_as_zero = round(deviation_mm * 1000, decimals) == 0 < abs(deviation_mm)
+    return um(deviation_mm, max(decimals, 1) if reads_as_zero else decimals)
+
+
 def in_um(deviation_mm: float | None, decimals: int = 1) -> str:
     """The same without its unit, which the head of a column names."""
     return signed(None if deviation_mm is None else deviation_mm * 1000, decimals)

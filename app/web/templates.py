@@ -76,6 +76,7 @@ def environment() -> Environment:
     env.install_gettext_callables(i18n._, i18n.ngettext, newstyle=True)  # type: ignore[attr-defined]
     env.filters.update(
         um=numbers.um,
+        read_um=numbers.read_um,
         um_limit=numbers.um_limit,
         tolerance=lambda of: numbers.tolerance_um(of.half, of.natural_limit),
         mm=numbers.mm,

@@ -8,7 +8,7 @@ from sqlalchemy.orm import object_session
 
 from app.core.probing import TouchError
 from app.language.i18n import _
-from app.language.numbers import NOTHING, tolerance_um, um
+from app.language.numbers import NOTHING, read_um, tolerance_um
 from app.loop.alarms.kinds import AlarmKind, register
 from app.loop.readings.wording import first_move_sentence, touch_problem
 from app.loop.tables.alarms import Alarm
@@ -17,19 +17,19 @@ from app.loop.tables.connections import Connection
 
 def _deviation(alarm: Alarm, text: str) -> str:
     values = {
-        "deviation": um(alarm.data.get("deviation")),
+        "deviation": read_um(alarm.data.get("deviation"), alarm.data.get("limit")),
         "limit": tolerance_um(alarm.data.get("limit") or 0.0, alarm.data.get("natural_limit")),
     }
     return f"{text.format(tool=alarm.tool_memory, **values)}{_against(alarm)}"
 
 
-def moved_by(step: Mapping[str, Any]) -> str:
-    """Word what corrections asked and did, as it stands in the values of an alarm."""
+def moved_by(step: Mapping[str, Any], half: float | None = None) -> str:
+    """Word what corrections asked and did, as it stands in the values of an alarm. half: as of `deserved`, mm."""
     return _("correction {numbers} of {amount} asked for {asked} and the size changed by {done}").format(
         numbers="+".join(map(str, step.get("numbers") or ())) or NOTHING,
-        amount=um(step.get("amount")),
-        asked=um(step.get("asked")),
-        done=um(step.get("done")),
+        amount=read_um(step.get("amount"), half),
+        asked=read_um(step.get("asked"), half),
+        done=read_um(step.get("done"), half),
     )
 
 
@@ -38,7 +38,7 @@ def _against(alarm: Alarm) -> str:
     if "against" not in alarm.data:
         return ""
     text = _("The size went the wrong way: {step}. Check the sign of the factor and the offset register.")
-    return " " + text.format(step=moved_by(alarm.data["against"]))
+    return " " + text.format(step=moved_by(alarm.data["against"], alarm.data.get("limit")))
 
 
 def _tool_worn(alarm: Alarm) -> str:

@@ -20,7 +20,7 @@ from app.loop.readings.answers import AtTwenty, answer
 from app.loop.readings.by_hand import queries as by_hand
 from app.loop.readings.by_hand.wording import as_json as in_json
 from app.loop.readings.records import Entry, Record
-from app.loop.readings.wording import reason
+from app.loop.readings.wording import as_read, reason
 from app.loop.tables.alarms import Alarm
 from app.loop.tables.characteristics import Characteristic
 from app.loop.tables.machines import Machine
@@ -108,7 +108,10 @@ def pushed_results(session: Session, sources: Iterable[str], results: Sequence[s
 
 
 def answers(session: Session, entry: Entry, records: list[Record]) -> list[dict[str, Any]]:
-    """The stored readings as they were answered, with what has been said about them since (excluded)."""
+    """The stored readings as they were answered, with what has been said about them since (excluded).
+
+    Their reason has two texts: `text` as it was answered, exact, and `as_read` for a page.
+    """
     if not records:
         return []
     numbers = [record.correction for record in records if record.correction is not None]
@@ -140,22 +143,26 @@ def answers(session: Session, entry: Entry, records: list[Record]) -> list[dict[
     results = _results(session, entry, [record.sequence for record in records])
     following = _measure_next(session, entry, [record.sequence for record in records])
     touches = touches_of(session, entry, [record.sequence for record in records if record.code == Code.TOUCH_FAULT])
-    return [
-        answer(
+    found_answers = []
+    for record in records:
+        limits = characteristics.parameters_of(
+            session, entry.machine_id, entry.characteristic_id, record.parameters_version
+        )
+        correction = None if record.correction is None else corrections.get(record.correction)
+        touched = touches.get(record.sequence)
+        first = answer(
             entry.characteristic,
             record,
-            characteristics.parameters_of(
-                session, entry.machine_id, entry.characteristic_id, record.parameters_version
-            ),
-            correction=corrections.get(record.correction) if record.correction is not None else None,
+            limits,
+            correction=correction,
             alarms=[(number, kinds[number]) for number in record.alarms or () if number in kinds],
             results=results.get(record.sequence),
             measure_next=following.get(record.sequence),
-            touches=touches.get(record.sequence),
+            touches=touched,
         )
-        | {"excluded": excluded.get(record.sequence)}
-        for record in records
-    ]
+        first["reason"]["as_read"] = as_read(record, limits, correction[1] if correction else None, touched)
+        found_answers.append(first | {"excluded": excluded.get(record.sequence)})
+    return found_answers
 
 
 def _results(session: Session, entry: Entry, sequences: list[int]) -> dict[int, Results]:
@@ -287,7 +294,7 @@ def first_answers(session: Session, entry: Entry, sequences: Iterable[int]) -> d
         first["sequence"]: first for first in answers(session, entry, [Record(*row) for row in rows])
     }
     for first in answers_by_sequence.values():
-        del first["excluded"]  # the first answer could not know it
+        del first["excluded"], first["reason"]["as_read"]  # the first answer could not know one and had not the other
     return answers_by_sequence
 
 
@@ -352,7 +359,8 @@ def reasons(
     for record in (Record(*row) for row in rows):
         at = (record.characteristic_id, record.sequence)
         parameters = characteristics.parameters_of(session, machine_id, at[0], record.parameters_version)
-        reasons_by_key[at] = reason(record, parameters, amounts[at])
+        said = reason(record, parameters, amounts[at])
+        reasons_by_key[at] = said | {"as_read": as_read(record, parameters, amounts[at])}
     return reasons_by_key
 
 

@@ -1,5 +1,7 @@
 """The sentences about readings: why it was decided so, and what is wrong with touches."""
 
+from __future__ import annotations
+
 from collections.abc import Callable, Sequence
 from typing import Any
 
@@ -10,6 +12,7 @@ from app.core.parameters import Feature, Parameters
 from app.core.plausibility import looks_like_inches, looks_like_micrometres
 from app.core.probing import TouchError, Touches, measured_value
 from app.language.i18n import _, ngettext
+from app.language.numbers import MINUS, decimals_beside, deserved
 from app.loop.readings.records import MOST_OUTSTANDING, Record
 
 NAMED_AT_MOST = 3
@@ -31,9 +34,19 @@ def reason(
     amount: of the correction it led to, if any, mm. touches: of a touch fault, which names the one that it is about.
     """
     notes = [code for code, applies in _notes(record, parameters, amount) if applies]
-    about = _touch_fault(parameters, touches) if record.code == Code.TOUCH_FAULT else _sentence(record, parameters)
-    sentences = [about, *(_note(code, record, parameters) for code in notes)]
-    return {"code": record.code, "text": " ".join(sentences), "notes": notes}
+    return {"code": record.code, "text": _text(_Values(record, parameters), notes, touches), "notes": notes}
+
+
+def as_read(record: Record, parameters: Parameters, amount: float | None = None, touches: Touches | None = None) -> str:
+    """Return the sentence of `reason` as a page shows it: with the decimals that the tolerance deserves."""
+    notes = [code for code, applies in _notes(record, parameters, amount) if applies]
+    return _text(_ReadValues(record, parameters), notes, touches)
+
+
+def _text(values: _Values, notes: Sequence[str], touches: Touches | None) -> str:
+    fault = values.record.code == Code.TOUCH_FAULT
+    about = _touch_fault(values.parameters, touches) if fault else _sentence(values)
+    return " ".join([about, *(_note(code, values) for code in notes)])
 
 
 def _notes(record: Record, parameters: Parameters, amount: float | None) -> tuple[tuple[str, bool], ...]:
@@ -78,7 +91,31 @@ class _Values(dict[str, str]):
 
     def __missing__(self, name: str) -> str:
         value = _WORDED[name](self.record, self.parameters)
-        return um(value) if isinstance(value, float) else str(value)
+        return self.length(name, value) if isinstance(value, float) else str(value)
+
+    def length(self, _name: str, length: float) -> str:
+        return um(length)
+
+
+class _ReadValues(_Values):
+    """The same with the decimals that the tolerance deserves; no deviation is rounded across a limit that decides."""
+
+    def length(self, name: str, length: float) -> str:
+        p = self.parameters
+        usual, value = deserved(p.half), round(length * 1000, 6)
+        if name in _MEASURED:
+            limits = (p.zero_range, p.averaging_limit, p.half, p.wear_limit, p.confidence_limit, p.plausible_jump)
+            decimals = decimals_beside(
+                value,
+                usual,
+                *(round(side * limit * 1000, 6) for limit in limits if limit is not None for side in (1, -1)),
+            )
+            return _in_um(value, max(decimals, 1) if round(value, decimals) == 0 != value else decimals)
+        return _in_um(value, usual if round(value, usual) == value else usual + 1)
+
+
+def _in_um(value: float, decimals: int) -> str:
+    return f"{MINUS if round(value, decimals) < 0 else ''}{abs(value):.{decimals}f} µm"
 
 
 def _of_reading(name: str) -> Callable[[Record, Parameters], Any]:
@@ -106,7 +143,12 @@ _WORDED: dict[str, Callable[[Record, Parameters], float | int | None]] = {
     "jump": _of_parameters("plausible_jump"),
     "n": _of_parameters("accept_n"),
     "m": _of_parameters("accept_m"),
+    "step": lambda _record, parameters: parameters.max_step or 0.0,
+    "value": empirical_value,
+    "decided": _of_reading("decided"),
+    "location": _of_parameters("average_memory"),
 }
+_MEASURED = ("deviation", "raw", "worn", "average", "averaged", "decided")
 
 
 def first_move_sentence(feature: str | None) -> str:
@@ -124,8 +166,8 @@ def first_move_sentence(feature: str | None) -> str:
             return _("The first move of the probe triggered: there is no bore here, or a chip, or the wrong part.")
 
 
-def _sentence(record: Record, parameters: Parameters) -> str:
-    values = _Values(record, parameters)
+def _sentence(values: _Values) -> str:
+    record, parameters = values.record, values.parameters
     match record.code:
         case Code.WITHIN_ZERO_RANGE:
             text = _("Deviation %(deviation)s is within the zero range %(zero)s: no correction, the average is kept.")
@@ -215,26 +257,27 @@ def _touch_fault(parameters: Parameters, touches: Touches | None) -> str:
     return f"{about} {_stopped()}"
 
 
-def _note(code: str, record: Record, parameters: Parameters) -> str:
+def _note(code: str, values: _Values) -> str:
     match code:
         case "outstanding":
-            outstanding = record.outstanding or ()
+            outstanding = values.record.outstanding or ()
             numbers = _listed(outstanding)
             return ngettext(
                 "The part was cut before correction %(numbers)s took effect: its deviation of %(raw)s counts as %(decided)s.",
                 "The part was cut before corrections %(numbers)s took effect: its deviation of %(raw)s counts as %(decided)s.",
                 len(outstanding),
-            ) % {"numbers": numbers, "raw": um(record.deviation), "decided": um(record.decided)}
+            ) % {"numbers": numbers, "raw": values["raw"], "decided": values["decided"]}
         case "corrections_of_tool":
-            return _(
-                "The size of the tool is off by %(raw)s; with its corrections since it was changed that counts as %(decided)s."
-            ) % {"raw": um(record.deviation), "decided": um(record.decided)}
+            return (
+                _(
+                    "The size of the tool is off by %(raw)s; with its corrections since it was changed that counts as %(decided)s."
+                )
+                % values
+            )
         case "part_out_of_tolerance":
-            return _("The part itself is out of tolerance by its deviation of %(raw)s.") % {"raw": um(record.deviation)}
+            return _("The part itself is out of tolerance by its deviation of %(raw)s.") % values
         case "clamped":
-            return _("The correction is limited to the largest step %(step)s.") % {
-                "step": um(parameters.max_step or 0.0)
-            }
+            return _("The correction is limited to the largest step %(step)s.") % values
         case "inches":
             return _("As inches the value would fit: readings are sent in mm.")
         case "micrometres":
@@ -242,10 +285,7 @@ def _note(code: str, record: Record, parameters: Parameters) -> str:
         case "target_in_inches":
             return _("The target would fit as inches: parameters are in mm.")
         case "empirical_value":
-            return _("The empirical value %(value)s (R11 = %(location)s) is taken off.") % {
-                "value": um(empirical_value(record, parameters)),
-                "location": parameters.average_memory,
-            }
+            return _("The empirical value %(value)s (R11 = %(location)s) is taken off.") % values
         case _:
             return _("It came late: a later measurement had arrived before it.")
 

@@ -9,7 +9,7 @@ from markupsafe import Markup, escape
 from app.core.decision.limits import HasLimits, Limits, classify, within_tolerance
 from app.core.natural import half_of, natural_of, tolerance_about_target
 from app.language.i18n import _
-from app.language.numbers import um
+from app.language.numbers import read_um, um_limit
 from app.views.characteristic.figures.labels import judged_sides
 from app.views.characteristic.figures.scale import ZoneScale, bands, ends_of
 from app.web.states import tone_of
@@ -73,9 +73,11 @@ def band_picture(
         zone = zone or classify(deviation, Limits.of(limits))
         at = min(max(x(scale.position(deviation)), 9), WIDTH - 9)
         parts.append(_mark(zone, at, (TOP + BOTTOM) / 2, 18))
-        label = _("Last deviation {deviation}, zone {zone}").format(deviation=um(deviation), zone=zone_name(zone))
+        label = _("Last deviation {deviation}, zone {zone}").format(
+            deviation=read_um(deviation, half_of(limits)), zone=zone_name(zone)
+        )
         if average is not None:
-            label += "; " + _("running average {average}").format(average=um(average))
+            label += "; " + _("running average {average}").format(average=read_um(average, half_of(limits)))
     return Markup(  # noqa: S704 - built here out of numbers and our own words, the label escaped
         f'<svg class="band-picture flat" viewBox="0 0 {WIDTH:g} {HEIGHT:g}" role="img" aria-label="{escape(label)}">'
         f"{''.join(parts)}</svg>"
@@ -115,7 +117,9 @@ def sparkline(deviations: Sequence[float], limits: HasLimits) -> Markup:
         ]
         parts.append(f'<path class="last" d="M{points[-1][0]:.1f} {points[-1][1]:.1f}h0"/>')
         label = _("Trend of the last {n} deviations, from {first} to {last}").format(
-            n=len(deviations), first=um(deviations[0]), last=um(deviations[-1])
+            n=len(deviations),
+            first=read_um(deviations[0], half_of(limits)),
+            last=read_um(deviations[-1], half_of(limits)),
         )
     else:
         label = _("No reading yet")
@@ -152,7 +156,12 @@ def tolerance_bar(deviations: Sequence[float], limits: HasLimits) -> Markup:
         ]
         label = _(
             "The last {n} deviations lie between {least} and {most}; the tolerance is {tolerance} about the target"
-        ).format(n=len(deviations), least=um(least), most=um(most), tolerance=f"±{um(tolerance).removeprefix('+')}")
+        ).format(
+            n=len(deviations),
+            least=read_um(least, tolerance),
+            most=read_um(most, tolerance),
+            tolerance=um_limit(tolerance),
+        )
     return Markup(  # noqa: S704 - as above
         f'<svg class="tolerance-bar" viewBox="0 0 {width:g} {height:g}" role="img" aria-label="{escape(label)}">{"".join(parts)}</svg>'
     )

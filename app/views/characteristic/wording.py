@@ -4,7 +4,7 @@ from typing import NamedTuple
 
 from app.core.state import CharacteristicState
 from app.language.i18n import _
-from app.language.numbers import um
+from app.language.numbers import read_um
 from app.views.characteristic.state_queries import CharacteristicRow
 
 
@@ -41,7 +41,7 @@ def next_action(row: CharacteristicRow, machine: str) -> NextAction | None:
     if waiting is not None and row.state in WAITING:
         path = path or f"/machines/{machine}/corrections/{waiting[0]}"
     if row.state in _ACTIONS:
-        amount = um(waiting[2] if waiting else None)
+        amount = read_um(waiting[2] if waiting else None, row.parameters.half)
         return NextAction(_ACTIONS[row.state]().format(tool=row.parameters.tool_memory, amount=amount), path)
     return NextAction(_("Acknowledge the alarm"), path) if row.alarms else None
 

@@ -1,7 +1,7 @@
 """The next action at a machine, in words that are short enough to be read from two metres."""
 
 from app.language.i18n import _
-from app.language.numbers import um
+from app.language.numbers import read_um
 from app.views.characteristic import wording
 from app.views.station.queries import Station
 
@@ -15,5 +15,7 @@ def next_action(station: Station) -> str:
     if station.active:
         return _("Acknowledge the alarm")
     if station.waiting:
-        return _("Decide on the correction of {amount}").format(amount=um(station.waiting[0].row.correction.amount))
+        first = station.waiting[0]
+        amount = read_um(first.row.correction.amount, first.parameters.half)
+        return _("Decide on the correction of {amount}").format(amount=amount)
     return _("Nothing to do")

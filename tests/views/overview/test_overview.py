@@ -116,7 +116,7 @@ def test_the_characteristics_of_a_part_show_the_tolerance_they_use(ranking: Shop
     opened = viewer.open(f"/overview?part=Ring%20{ranking.machine}")
     assert re.findall(r'<tr id="c-([^"]+)"', opened) == [f"{ranking.machine}-wide"]
     assert (
-        "The last 24 deviations lie between −7.0 µm and +7.0 µm; the tolerance is ±8.0 µm about the target"
+        "The last 24 deviations lie between −7.0 µm and +7.0 µm; the tolerance is ±8 µm about the target"
         in opened.replace("\xa0", " ")
     )
     assert "No characteristic belongs to the part" in viewer.open("/overview?part=Ring%208")

@@ -287,5 +287,6 @@ def stored_of(session: Session, sheet: Sheet, key: str) -> list[tuple[SheetLine,
                 ReadingContext.sequence == sequence,
             )
         )
-        found.append((line, readings.first_answers(session, line.entry, [sequence])[sequence], context or {}))
+        (answer,) = readings.answers(session, line.entry, [readings.record_of(session, line.entry, sequence)])
+        found.append((line, answer, context or {}))
     return found

@@ -18,8 +18,9 @@ from typing import Literal
 from app.charts import Axis, Chart, Dots, Faded, Note, Panel, Pen, Room, Series, bold, empty
 from app.charts import Mark as Drawn
 from app.core.decision.limits import HasLimits, Limits
+from app.core.natural import half_of
 from app.language.i18n import _
-from app.language.numbers import um
+from app.language.numbers import read_um, um
 from app.language.times import plant_zone, written
 from app.loop.timeline.figures import Event, event_lane
 from app.views.characteristic.figures.blocks import Block, envelope, summed_up
@@ -103,7 +104,7 @@ def zone_chart(
         *envelope([*blocks, *_in_groups(points)], ruler.position, Limits.of(limits), extremes=blocks),
         *_average(blocks, points, ruler),
         *_at_20(at_20 or {}, ruler),
-        *_readings(points, ruler),
+        *_readings(points, ruler, half_of(limits)),
         *_ring(points, ringed, ruler),
         *hand_marks(hands, ruler),
         *limit_labels(limits, ruler, letters, brief=brief),
@@ -155,11 +156,14 @@ def _size_axis(limits: HasLimits, ruler: Scale, sizes: SizeAxis | None, letters:
     )
 
 
-def _hover(point: Point) -> str:
-    lines = [bold(_("Reading {n}").format(n=point.sequence)), f"{um(point.deviation)} · {zone_name(point.zone)}"]
+def _hover(point: Point, half: float) -> str:
+    lines = [
+        bold(_("Reading {n}").format(n=point.sequence)),
+        f"{read_um(point.deviation, half)} · {zone_name(point.zone)}",
+    ]
     lines += size_lines(point.size, point.measured)
     if point.average is not None:
-        lines.append(_("running average {average}").format(average=um(point.average, 2)))
+        lines.append(_("running average {average}").format(average=read_um(point.average, half)))
     if point.excluded:
         lines.append(_("excluded from statistics"))
     if point.at is not None:
@@ -190,7 +194,7 @@ def _in_groups(points: Sequence[Point]) -> list[Block]:
     ]
 
 
-def _readings(points: Sequence[Point], ruler: Scale) -> list[Series]:
+def _readings(points: Sequence[Point], ruler: Scale, half: float) -> list[Series]:
     """Every reading: the shape of its zone; hollow if excluded; at the edge with its value if it lies beyond."""
     if not points:
         return []
@@ -212,7 +216,7 @@ def _readings(points: Sequence[Point], ruler: Scale) -> list[Series]:
             dots,
             meta="readings",
             name=_("Reading"),
-            hover=[_hover(point) for point in points],
+            hover=[_hover(point, half) for point in points],
             links=[point.link for point in points],
             first=True,
         )

@@ -289,7 +289,7 @@ def decisions(frame: Frame) -> Section | None:
             Column("status", _("Issued as"), 0.9),
             lambda answer: words(status_word(answer["correction"]["status"]) if answer["correction"] else ""),
         ),
-        (Column("reason", _("Reason"), 4.8), lambda answer: words(answer["reason"]["text"])),
+        (Column("reason", _("Reason"), 4.8), lambda answer: words(answer["reason"]["as_read"])),
         more=frame.numbers.count + frame.numbers.excluded - len(records),
     )
     sentence = _("Newest first; the export of readings holds all of them.")
