@@ -148,17 +148,18 @@ class Person:
 
     def send(self, path: str, status: int = 200, **fields: str) -> str:
         """Send a form with the token of this session; the text of the page that one ends up on."""
-        answer = self.browser.post(path, data={"csrf": self._csrf(), **fields})
+        answer = self.browser.post(path, data={"csrf": self.csrf(), **fields})
         assert answer.status_code == status, f"{path}: {answer.status_code} {answer.text}"
         return answer.text
 
     def post(self, path: str, status: int = 303, /, **fields: str | list[str]) -> httpx.Response:
         """The same, and the answer itself: where it leads nobody goes."""
-        answer = self.browser.post(path, data={"csrf": self._csrf(), **fields}, follow_redirects=False)
+        answer = self.browser.post(path, data={"csrf": self.csrf(), **fields}, follow_redirects=False)
         assert answer.status_code == status, f"{path}: {answer.status_code} {answer.text[:3000]}"
         return answer
 
-    def _csrf(self) -> str:
+    def csrf(self) -> str:
+        """The token of this session, which each change carries."""
         text = self.open("/account")  # a page that is as short on a crowded server
         found = re.search(r'<meta name="csrf" content="([^"]+)"', text)
         assert found is not None

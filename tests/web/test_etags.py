@@ -7,7 +7,7 @@ from typing import Any
 import httpx
 import pytest
 
-from tests.shop import Shop
+from tests.shop import Person, Shop
 from tests.web.test_bad_input import BODIES, operations
 
 
@@ -82,8 +82,25 @@ def _route(shop: Shop, n: int) -> Edit:
     }
 
 
+def _receiver(shop: Shop, n: int) -> Edit:
+    name = f"receiver-{shop.machine}"
+    if n == 1:
+        shop.call("POST", "/notifications/receivers", 201, name=name, means="mail", address="anna@example.com")
+    receivers = shop.call("GET", "/notifications/receivers?limit=1000")["items"]
+    number = next(each["id"] for each in receivers if each["name"] == name)
+    return f"/notifications/receivers/{number}", {"address": f"anna-{n}@example.com"}
+
+
+def _entry(shop: Shop, n: int) -> Edit:
+    name = f"Chip at {shop.machine}"
+    if n == 1:
+        shop.call("POST", "/reactions/catalogue", 201, sort="cause", name=name)
+    entries = shop.call("GET", "/reactions/catalogue?limit=1000")["items"]
+    return f"/reactions/catalogue/{next(each['id'] for each in entries if each['name'] == name)}", {"retired": n == 1}
+
+
 EDITS: dict[str, Callable[[Shop, int], Edit]] = {
-    "PATCH /machines/{machine}": lambda shop, n: (f"/machines/{shop.machine}", {"name": f"Lathe {n}"}),
+    "PATCH /machines/{machine}": lambda shop, n: (f"/machines/{shop.machine}", {"name": f"Name {n}"}),
     "PATCH /characteristics/{characteristic}": lambda shop, n: (
         f"/characteristics/{shop.characteristic}",
         {"parameters": {"R29": 2 + n}} | WHY,
@@ -121,17 +138,32 @@ EDITS: dict[str, Callable[[Shop, int], Edit]] = {
         f"/characteristics/{shop.characteristic}/expansion",
         {"coefficient": 11.0 + n} | WHY,
     ),
+    "PUT /machines/{machine}/averages/{location}/calibration-plan": lambda shop, n: (
+        f"/machines/{shop.machine}/averages/5/calibration-plan",
+        {"due_parts": 100 * n},
+    ),
+    "PUT /machines/{machine}/tools/{tool}/calibration-plan": lambda shop, n: (
+        f"/machines/{shop.machine}/tools/3/calibration-plan",
+        {"due_days": 7.0 * n, "acceptance": "automatic"},
+    ),
+    "PATCH /reactions/catalogue/{entry}": _entry,
+    "PATCH /notifications/receivers/{receiver}": _receiver,
     "PUT /machines/{machine}/context": lambda shop, n: (f"/machines/{shop.machine}/context", {"order": f"47{n}"}),
 }
 
 
-def test_every_edit_that_takes_if_match_is_tried_here() -> None:
+OF_A_PERSON = {"PUT /notifications/me"}  # below; the key that asks for the others is none
+
+
+def test_every_edit_takes_if_match_and_is_tried_here() -> None:
+    edits = {operation.name for operation in operations() if operation.name.startswith(("PUT ", "PATCH "))}
+    assert {name.replace("/api/v1", "") for name in edits} == set(EDITS) | OF_A_PERSON
     taking = {
         operation.name.replace("/api/v1", "")
         for operation in operations()
         if any(parameter["name"].lower() == "if-match" for parameter in operation.declared.get("parameters", ()))
     }
-    assert taking == set(EDITS)
+    assert taking == set(EDITS) | OF_A_PERSON
 
 
 @pytest.mark.parametrize("operation", EDITS)
@@ -151,6 +183,20 @@ def test_a_change_of_what_has_changed_since_is_412(shop: Shop, operation: str) -
     assert tag(shop, path) in problem["detail"]
     assert edit(shop, method, path, second, tag(shop, path)).status_code == 200
     assert edit(shop, method, path, first).status_code == 200, "without If-Match nothing is compared"
+
+
+def test_of_two_windows_of_one_person_the_second_hears_of_the_first(shop: Shop) -> None:
+    person, path = Person(shop.server, "viewer"), "/api/v1/notifications/me"
+
+    def set_address(address: str, if_match: str) -> int:
+        headers = {"X-CSRF-Token": person.csrf(), "If-Match": if_match}
+        return person.browser.put(path, json={"address": address}, headers=headers).status_code
+
+    assert set_address("anna@example.com", "*") == 404
+    person.send("/account/notifications", address="anna@example.com")
+    seen = person.browser.get(path).headers["ETag"]
+    assert [set_address(f"{name}@example.com", seen) for name in ("bea", "cara")] == [200, 412]
+    assert person.browser.get(path).json()["address"] == "bea@example.com"
 
 
 def test_tags_of_proxies_lists_and_any(shop: Shop) -> None:

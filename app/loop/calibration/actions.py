@@ -245,7 +245,7 @@ def _keep(
     else:
         changes += end_alarms(session, machine, made)
         count_again(session, machine, place, made.calibrated_at)
-        plan = session.get(CalibrationPlan, (machine.id, *place), populate_existing=True)
+        plan = queries.plan(session, machine, place)
         sure = not made.settings.get("warnings")  # what may be wrong is for a person to accept
         if made.proposed is not None and sure and plan is not None and plan.acceptance == "automatic":
             put_into_effect(session, machine, made, _("applied automatically, as planned"), caller, automatic=True)
@@ -335,8 +335,7 @@ def set_plan(
 ) -> CalibrationPlan:
     """Plan how often to calibrate this place, and if its results are applied automatically. Raises `NotFound`."""
     lock_machines(session, [machine.id])
-    queries.value_of(session, machine, place)
-    plan = session.get(CalibrationPlan, (machine.id, *place), populate_existing=True)
+    plan = queries.plan(session, machine, place)
     settings = given.model_dump()
     if plan is None:
         count_again(session, machine, place, datetime.now(UTC))

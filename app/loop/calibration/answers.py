@@ -9,6 +9,7 @@ from app.loop.calibration import wording
 from app.loop.calibration.figures import Mark
 from app.loop.calibration.places import PlaceRow
 from app.loop.calibration.queries import CalibrationRow, Pair, Suggestion
+from app.loop.tables.calibration import CalibrationPlan
 from app.loop.warnings.wording import sentence
 from app.web.fields import answer_from
 from app.web.warnings import WarningOut, Warnings, warnings_out
@@ -230,7 +231,15 @@ def suggestion_out(found: Suggestion, machine: str, location: int) -> Suggestion
     )
 
 
-class PlaceOut(BaseModel):
+class CalibrationPlanOut(BaseModel):
+    """Interval of calibration, and automatic or approved application of its results."""
+
+    acceptance: Annotated[str, Field(description="accept or automatic.")]
+    due_parts: Annotated[int | None, Field(description="Due after N parts; null: not by parts.")]
+    due_days: Annotated[float | None, Field(description="Due after N days; null: not by days.")]
+
+
+class PlaceOut(CalibrationPlanOut):
     """A place that is calibrated, and when that is due."""
 
     machine: str
@@ -239,13 +248,19 @@ class PlaceOut(BaseModel):
     state: Annotated[State, Field(description="Whether a calibration is due.")]
     characteristics: Annotated[list[str], Field(description="Which characteristics use it.")]
     value: Annotated[float, Field(description="Empirical value or offset in effect.")]
-    acceptance: Annotated[str, Field(description="accept or automatic.")]
-    due_parts: Annotated[int | None, Field(description="Due after N parts; null: not by parts.")]
-    due_days: Annotated[float | None, Field(description="Due after N days; null: not by days.")]
     parts: Annotated[int, Field(description="Parts since the last calibration, or since the plan was made.")]
     since: Annotated[datetime | None, Field(description="From when parts and days count.")]
     due_at: Annotated[datetime | None, Field(description="When it is due by days.")]
     last: Annotated[int | None, Field(description="Number of the last calibration.")]
+
+
+def plan_out(plan: CalibrationPlan | None) -> CalibrationPlanOut:
+    """A plan as it is answered; None: nothing is planned."""
+    return CalibrationPlanOut(
+        acceptance="accept" if plan is None else plan.acceptance,
+        due_parts=None if plan is None else plan.due_parts,
+        due_days=None if plan is None else plan.due_days,
+    )
 
 
 def place_out(row: PlaceRow) -> PlaceOut:
@@ -257,9 +272,7 @@ def place_out(row: PlaceRow) -> PlaceOut:
         machine=row.machine.key,
         average_memory=row.place.location if average else None,
         tool_memory=None if average else row.place.location,
-        acceptance="accept" if plan is None else plan.acceptance,
-        due_parts=None if plan is None else plan.due_parts,
-        due_days=None if plan is None else plan.due_days,
+        **dict(plan_out(plan)),
         since=None if plan is None else plan.since,
         last=None if row.last is None else row.last.record.number,
     )

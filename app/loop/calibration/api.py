@@ -9,6 +9,7 @@ from app.core.parameters import MOST_LOCATIONS
 from app.loop.calibration import actions, figures, pairs, places, queries
 from app.loop.calibration.answers import (
     CalibrationOut,
+    CalibrationPlanOut,
     PairOut,
     PlaceOut,
     SuggestionOut,
@@ -16,11 +17,12 @@ from app.loop.calibration.answers import (
     mark_of,
     pair_out,
     place_out,
+    plan_out,
     suggestion_out,
 )
 from app.loop.calibration.queries import Place
 from app.loop.calibration.schemas import CalibrationPlanIn, GaugeIn, PairIn, RingIn, SuggestionAcceptIn
-from app.loop.machines.queries import machine_for, machine_named
+from app.loop.machines.queries import hold_machine, machine_for, machine_named
 from app.loop.timeline.figures import CALIBRATION
 from app.loop.timeline.queries import with_events_of_machine
 from app.web.api import (
@@ -37,6 +39,7 @@ from app.web.api import (
     sent_again,
 )
 from app.web.deps import SessionDep
+from app.web.etags import TAGGED, guarded, tagged
 from app.web.fields import Page, ReasonIn, page_of
 
 router = api_router("calibration")
@@ -51,7 +54,7 @@ PairId = Annotated[int, Path(description="Number of the pair.", examples=[31])]
 
 @router.get("/calibration", dependencies=[require("viewer")])
 def list_calibration_places(session: SessionDep) -> Page[PlaceOut]:
-    """Every place that is calibrated, with what was found last and when the next calibration is places."""
+    """Every place that is calibrated, with what was found last and when the next calibration is due."""
     return Page(items=[place_out(row) for row in places.places(session)])
 
 
@@ -197,7 +200,18 @@ def accept_suggestion(
 # --- plans and charts
 
 
-@router.put("/machines/{machine}/averages/{location}/calibration-plan", responses=problems(404))
+@router.get("/machines/{machine}/averages/{location}/calibration-plan", responses=problems(404) | TAGGED)
+@tagged
+def get_calibration_plan(
+    session: SessionDep, caller: AnyCaller, machine: MachineKey, location: R11
+) -> CalibrationPlanOut:
+    """How often the probe is calibrated for this location, and if the results are applied automatically."""
+    machine_row = machine_for(session, caller, machine, "viewer")
+    return plan_out(queries.plan(session, machine_row, Place("average", location)))
+
+
+@router.put("/machines/{machine}/averages/{location}/calibration-plan", responses=problems(404, 412))
+@guarded(get_calibration_plan, hold_machine)
 def plan_calibration(
     session: SessionDep, caller: Engineer, machine: MachineKey, location: R11, given: CalibrationPlanIn
 ) -> PlaceOut:
@@ -208,7 +222,18 @@ def plan_calibration(
     return _planned(session, caller, machine, Place("average", location), given)
 
 
-@router.put("/machines/{machine}/tools/{tool}/calibration-plan", responses=problems(404))
+@router.get("/machines/{machine}/tools/{tool}/calibration-plan", responses=problems(404) | TAGGED)
+@tagged
+def get_ring_calibration_plan(
+    session: SessionDep, caller: AnyCaller, machine: MachineKey, tool: R10
+) -> CalibrationPlanOut:
+    """The same for the offset of a probe, which is calibrated in a ring."""
+    machine_row = machine_for(session, caller, machine, "viewer")
+    return plan_out(queries.plan(session, machine_row, Place("tool", tool)))
+
+
+@router.put("/machines/{machine}/tools/{tool}/calibration-plan", responses=problems(404, 412))
+@guarded(get_ring_calibration_plan, hold_machine)
 def plan_ring_calibration(
     session: SessionDep, caller: Engineer, machine: MachineKey, tool: R10, given: CalibrationPlanIn
 ) -> PlaceOut:

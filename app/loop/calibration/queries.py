@@ -16,7 +16,7 @@ from app.core.warning import CodedWarning
 from app.errors import NotFound
 from app.language.i18n import _
 from app.loop.characteristics.queries import characteristics
-from app.loop.tables.calibration import CalibrationAcceptance, CalibrationRecord, PairedReading
+from app.loop.tables.calibration import CalibrationAcceptance, CalibrationPlan, CalibrationRecord, PairedReading
 from app.loop.tables.characteristics import Characteristic
 from app.loop.tables.machines import Machine
 from app.loop.tools import queries as tool_queries
@@ -89,6 +89,12 @@ def value_of(session: Session, machine: Machine, place: Place) -> float:
     if place.memory == "average":
         return tool_queries.average(session, machine, place.location).empirical_value
     return tool_queries.tool(session, machine, place.location).offset
+
+
+def plan(session: Session, machine: Machine, place: Place) -> CalibrationPlan | None:
+    """How often a place is calibrated; None where nothing is planned. Raises `NotFound` for a location that is not there."""
+    value_of(session, machine, place)
+    return session.get(CalibrationPlan, (machine.id, *place), populate_existing=True)
 
 
 def _rows(machine: Machine) -> Select[CalibrationRecord, CalibrationAcceptance]:

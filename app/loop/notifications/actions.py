@@ -8,7 +8,6 @@ from typing import Any
 from sqlalchemy import func, select
 from sqlalchemy.orm import Session
 
-from app.access import queries as people
 from app.access.audit.actions import record
 from app.access.callers import Caller
 from app.db.events import publish
@@ -200,7 +199,7 @@ def set_own(session: Session, given: OwnAddressIn, caller: Caller, settings: Set
     """Say where the caller gets mail. Raises `NotFound` for a key, which is no person; `Invalid`."""
     if caller.person_id is None:
         raise NotFound(_("A key is no person and has no mail address."), _("Sign in as a person."))
-    people.hold_person(session, {"person": caller.person_id})  # of two at once, one comes second
+    queries.hold_own(session, {"caller": caller})  # of two at once, one comes second
     row = queries.own(session, caller.person_id)
     reported = datetime.now(UTC) if given.shift_report else None
     if row is not None:

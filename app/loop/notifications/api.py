@@ -83,13 +83,15 @@ def add_receiver(
     return NewReceiverOut.of(row)
 
 
-@router.get("/notifications/receivers/{receiver}", dependencies=ADMIN, responses=problems(404))
+@router.get("/notifications/receivers/{receiver}", dependencies=ADMIN, responses=problems(404) | TAGGED)
+@tagged
 def get_receiver(session: SessionDep, receiver: ReceiverId) -> ReceiverOut:
     """One receiver, without its secret."""
     return ReceiverOut.of(queries.receiver(session, receiver))
 
 
-@router.patch("/notifications/receivers/{receiver}", responses=problems(404))
+@router.patch("/notifications/receivers/{receiver}", responses=problems(404, 412))
+@guarded(get_receiver, queries.hold_receiver)
 def change_receiver(
     session: SessionDep, caller: Admin, settings: SettingsDep, receiver: ReceiverId, change: ReceiverChange
 ) -> ReceiverOut:
@@ -128,7 +130,8 @@ def get_delivery(session: SessionDep, delivery: DeliveryId) -> DeliveryOut:
     return DeliveryOut.of(queries.delivery(session, delivery))
 
 
-@router.get("/notifications/me", responses=problems(404))
+@router.get("/notifications/me", responses=problems(404) | TAGGED)
+@tagged
 def get_own_address(session: SessionDep, caller: Viewer) -> ReceiverOut:
     """Your own mail address for notifications; 404 if you have given none."""
     row = queries.own(session, caller.person_id) if caller.person_id is not None else None
@@ -137,7 +140,8 @@ def get_own_address(session: SessionDep, caller: Viewer) -> ReceiverOut:
     return ReceiverOut.of(row)
 
 
-@router.put("/notifications/me", responses=problems(404))
+@router.put("/notifications/me", responses=problems(404, 412))
+@guarded(get_own_address, queries.hold_own)
 def set_own_address(session: SessionDep, caller: Viewer, settings: SettingsDep, given: OwnAddressIn) -> ReceiverOut:
     """Say where you get mail yourself, and when not. An administrator puts you into routes."""
     return ReceiverOut.of(actions.set_own(session, given, caller, settings))

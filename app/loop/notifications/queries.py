@@ -6,6 +6,7 @@ from typing import Any, NamedTuple
 from sqlalchemy import select
 from sqlalchemy.orm import Session
 
+from app.access.queries import hold_person
 from app.errors import NotFound
 from app.language.i18n import _
 from app.loop.notifications.tables import Delivery, NotificationRoute, Receiver
@@ -38,6 +39,11 @@ def receivers(session: Session, after: int = 0, limit: int = 1000) -> Sequence[R
     return session.scalars(query).all()
 
 
+def hold_receiver(session: Session, given: Mapping[str, Any]) -> None:
+    """Hold the receiver that a route names until the transaction ends."""
+    receiver(session, given["receiver"], hold=True)
+
+
 def receiver(session: Session, number: int, *, hold: bool = False) -> Receiver:
     """One receiver that is not deleted. hold: until the transaction ends. Raises `NotFound`."""
     found = session.get(Receiver, number, with_for_update=hold or None, populate_existing=True)
@@ -50,6 +56,11 @@ def own(session: Session, person_id: int | None) -> Receiver | None:
     """The mail address that a person has given; None without one."""
     query = select(Receiver).where(Receiver.person_id == person_id, Receiver.deleted_at.is_(None))
     return session.scalars(query).one_or_none()
+
+
+def hold_own(session: Session, given: Mapping[str, Any]) -> None:
+    """Hold the caller until the transaction ends, and so the address that this person has given or not."""
+    hold_person(session, {"person": given["caller"].person_id})
 
 
 def routes_to(session: Session, number: int) -> list[NotificationRoute]:

@@ -130,7 +130,15 @@ def add_catalogue_entry(session: SessionDep, caller: Engineer, given: CatalogueE
     return CatalogueEntryOut.of(actions.add_entry(session, given, caller))
 
 
-@router.patch("/reactions/catalogue/{entry}", responses=problems(404))
+@router.get("/reactions/catalogue/{entry}", dependencies=VIEWER, responses=problems(404) | TAGGED)
+@tagged
+def get_catalogue_entry(session: SessionDep, entry: EntryNumber) -> CatalogueEntryOut:
+    """One cause or corrective action."""
+    return CatalogueEntryOut.of(queries.entry(session, entry))
+
+
+@router.patch("/reactions/catalogue/{entry}", responses=problems(404, 412))
+@guarded(get_catalogue_entry, queries.hold_entry)
 def change_catalogue_entry(
     session: SessionDep, caller: Engineer, entry: EntryNumber, change: CatalogueEntryChange
 ) -> CatalogueEntryOut:

@@ -69,19 +69,19 @@ def test_without_scripts_photos_are_added_on_the_page_of_the_alarm(
     number = alarm(shop)
     path = f"/alarms/{number}/photos"
     files = [("photo", ("a.jpg", picture("JPEG"))), ("photo", ("b.png", picture()))]
-    answer = operator.browser.post(path, data={"csrf": operator._csrf()}, files=files)
+    answer = operator.browser.post(path, data={"csrf": operator.csrf()}, files=files)
     assert answer.status_code == 200, answer.text
     assert answer.text.count("<img src") == 2
     assert "f-photo" in answer.text
     assert "f-photo" not in viewer.open(f"/alarms/{number}")
-    wrong = operator.browser.post(path, data={"csrf": operator._csrf()}, files={"photo": ("c.jpg", b"<svg/>")})
+    wrong = operator.browser.post(path, data={"csrf": operator.csrf()}, files={"photo": ("c.jpg", b"<svg/>")})
     assert (wrong.status_code, "no PNG, JPEG or WebP" in wrong.text) == (422, True)
     many = [("photo", (f"{n}.png", picture())) for n in range(13)]
-    refused = operator.browser.post(path, data={"csrf": operator._csrf()}, files=many)
+    refused = operator.browser.post(path, data={"csrf": operator.csrf()}, files=many)
     assert (refused.status_code, "more than 12 pictures at once" in refused.text) == (422, True)
     assert len(shop.call("GET", path)["items"]) == 2
     large = operator.browser.post(
-        path, data={"csrf": operator._csrf()}, files={"photo": ("d.jpg", bytes(10 * MEGABYTE))}
+        path, data={"csrf": operator.csrf()}, files={"photo": ("d.jpg", bytes(10 * MEGABYTE))}
     )
     assert (large.status_code, "Send smaller pictures, or fewer at once." in large.text) == (413, True)
 

@@ -19,7 +19,7 @@ def plan(shop: Shop, status: int, *steps: dict[str, Any], **more: Any) -> Any:
 
 def sent(person: Person, path: str, picture: dict[str, bytes], **fields: str) -> httpx.Response:
     files = {name: ("any name.svg", content) for name, content in picture.items()}
-    return person.browser.post(path, data={"csrf": person._csrf(), **fields}, files=files)
+    return person.browser.post(path, data={"csrf": person.csrf(), **fields}, files=files)
 
 
 def test_a_step_shows_its_picture_wherever_the_plan_is_followed(server: Server, shop: Shop) -> None:

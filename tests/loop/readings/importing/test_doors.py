@@ -299,7 +299,7 @@ class Plant:
 
     def page(self, path: Path, characteristic: str = "", **said: str) -> str:
         """The page of the refusal, after the preview said the same; nothing where it was imported."""
-        browser, csrf = self.engineer.browser, self.engineer._csrf()
+        browser, csrf = self.engineer.browser, self.engineer.csrf()
         sent = browser.post(
             "/import",
             data={"csrf": csrf, "characteristic": characteristic},
