@@ -3,7 +3,7 @@
 Sixteen machines send a reading, wait for the answer, and send the next 200 ms after the last. Nobody else is there, then, each
 after an idle time of its own: 1,000 connections that are silent or keep half a head back, bodies that come ten bytes at a time,
 guesses of keys, passwords and badges, two imports one after the other without end, 20 requests for reports, and three times all
-of them. Everything is bounded in number and time and goes to this computer only; the strangers run at a lower priority, as they
+of them. The next idle time begins when all reports are made. Everything is bounded in number and time and goes to this computer only; the strangers run at a lower priority, as they
 would use processors of their own.
 
 ``python -m bench.strangers [--seconds 20]`` ends with 1 where the ratio is 5 or more.
@@ -39,6 +39,7 @@ GUESSERS, IMPORTERS, REPORTS = 8, 2, 20
 ROWS = 2000  # of the file that is imported
 PAUSE = 1.0  # s until a stranger who was refused comes again
 MOST_TIMES = 5000  # that one stranger does its thing
+REPORTS_MOST = 300  # s that all reports may take
 STRANGERS_MOST = 3.0  # s that ending all of them may take
 HEAD = "POST /api/v1/notes HTTP/1.1\r\nHost: 127.0.0.1\r\n"
 
@@ -209,14 +210,14 @@ def furnish(running: Plant) -> tuple[list[str], tuple[str, str], str]:
 
 
 def beside(
-    running: Plant, keys: list[str], told: str, which: str, seconds: float, run: str
+    running: Plant, keys: list[str], given: str, which: str, seconds: float, run: str
 ) -> tuple[Waited, dict[str, int]]:
     """Let the machines push while strangers of this kind are there; what these were answered."""
     words = [sys.executable, "-m", "bench.strangers", "--strangers", running.url, which, str(seconds + 5)]
     with subprocess.Popen(words, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True) as strangers:
         assert strangers.stdin is not None
         assert strangers.stdout is not None
-        strangers.stdin.write(told)
+        strangers.stdin.write(given)
         strangers.stdin.close()
         strangers.stdout.readline()  # they are there
         time.sleep(3.0)  # and have all come to something
@@ -225,17 +226,30 @@ def beside(
     return waited, got
 
 
+def wait_for_reports(running: Plant) -> None:
+    """Wait until every report that was asked for is made: the server is idle again."""
+    headers = {"Authorization": f"Bearer {running.key}"}
+    with httpx.Client(base_url=f"{running.url}/api/v1", headers=headers, timeout=60) as client:
+        for _second in range(REPORTS_MOST):
+            jobs = client.get("/reports").raise_for_status().json()["items"]
+            if all(job["state"] == "done" for job in jobs):
+                return
+            time.sleep(1)
+    raise TimeoutError(f"reports were still being made after {REPORTS_MOST} s")
+
+
 def main(seconds: float) -> int:
     with plant(characteristics=10) as running:
         keys, tablet, file = furnish(running)
         push(running.url, keys, 3.0, "warm")
-        told = json.dumps([running.key, tablet, file])
+        given = json.dumps([running.key, tablet, file])
         print(f"{'':8} {'readings':>9} {'median':>9} {'p99':>9} {'p99 / idle':>10}  strangers were answered")
         ratios: list[float] = []
         for turn, which in enumerate(("silent", "slow", "guesses", "imports", "reports", *["all"] * TURNS)):
             idle = push(running.url, keys, seconds, f"idle-{turn}")
-            waited, got = beside(running, keys, told, which, seconds, f"{which}-{turn}")
+            waited, got = beside(running, keys, given, which, seconds, f"{which}-{turn}")
             ratios.append(waited.p99 / idle.p99)
+            wait_for_reports(running)
             words = ", ".join(f"{what} × {many}" for what, many in sorted(got.items()))
             print(f"{'idle':8} {idle.number:9} {idle.median:6.1f} ms {idle.p99:6.1f} ms")
             print(

@@ -205,7 +205,7 @@ def accept_suggestion(
 def get_calibration_plan(
     session: SessionDep, caller: AnyCaller, machine: MachineKey, location: R11
 ) -> CalibrationPlanOut:
-    """How often the probe is calibrated for this location, and if the results are applied automatically."""
+    """The interval of calibration of the probe for this location, and if the results are applied automatically."""
     machine_row = machine_for(session, caller, machine, "viewer")
     return plan_out(queries.plan(session, machine_row, Place("average", location)))
 

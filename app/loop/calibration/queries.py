@@ -92,7 +92,7 @@ def value_of(session: Session, machine: Machine, place: Place) -> float:
 
 
 def plan(session: Session, machine: Machine, place: Place) -> CalibrationPlan | None:
-    """How often a place is calibrated; None where nothing is planned. Raises `NotFound` for a location that is not there."""
+    """The interval of calibration of a place; None where nothing is planned. Raises `NotFound` for a location that is not there."""
     value_of(session, machine, place)
     return session.get(CalibrationPlan, (machine.id, *place), populate_existing=True)
 
