@@ -1,5 +1,6 @@
 """Fields of readings as others write them, in files, lines and messages; as ``POST /readings`` takes them."""
 
+from collections.abc import Mapping
 from math import isfinite
 from typing import Any, Final, NamedTuple
 from zoneinfo import ZoneInfo
@@ -104,3 +105,13 @@ def put(body: dict[str, Any], field: str, value: Any) -> None:
         body.setdefault("context", {})[field] = value
     else:
         body[field] = value
+
+
+def left_out_since(before: Mapping[str, str], body: Mapping[str, Any], left_out: Mapping[str, str]) -> dict[str, str]:
+    """Temperatures that are left out, in words by field, after one more reading: a good one ends what was said of its field.
+
+    >>> left_out_since({"part_temperature": "a", "machine_temperature": "b"}, {"context": {"part_temperature": 21.5}}, {})
+    {'machine_temperature': 'b'}
+    """
+    good = body.get("context", {})
+    return {field: words for field, words in before.items() if field not in good} | left_out

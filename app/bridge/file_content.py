@@ -119,13 +119,14 @@ class Entry(NamedTuple):
 class Content:
     """The content of a file.
 
-    skipped: readings that were passed over. complete: its last line has an end. digest: a hash of the whole. stamp: the one
+    left_out: temperatures, in words by field. skipped: readings that were passed over. complete: its last line has an end. digest: a hash of the whole. stamp: the one
     that is in the keys of readings that nothing else tells apart.
     """
 
     entries: list[Entry] = field(default_factory=list)
     faults: list[Fault] = field(default_factory=list)
     remarks: list[str] = field(default_factory=list)
+    left_out: dict[str, str] = field(default_factory=dict)
     skipped: int = 0
     complete: bool = True
     digest: str = ""
@@ -216,6 +217,7 @@ class _Reader:
                 seed.update(path.read_bytes())
         self._prefixes(seed)
         self.remarks = Repeats()
+        self.left_out: dict[str, Repeats] = {}
         self.nominal: dict[str, tuple[int, str]] = {}
         if earlier is not None and earlier[0] in self.prefix:
             content.stamp = earlier[1]
@@ -245,6 +247,7 @@ class _Reader:
             case "aqdef":
                 self._aqdef()
         self.content.remarks = self.remarks.sentences()
+        self.content.left_out = {name: "; ".join(each.sentences()) for name, each in self.left_out.items()}
 
     # --- tables
 
@@ -276,7 +279,9 @@ class _Reader:
                     del fields[name]
                     if columns[name] not in units:
                         units[columns[name]] = None
-                        self._remark(aqdef.Remark(line, columns[name], "", "names another scale than °C; left out"))
+                        self._leave_out(
+                            name, aqdef.Remark(line, columns[name], "", "names another scale than °C; left out")
+                        )
             if "unit" not in self.settings.columns:
                 fields["unit"] = beside(row, "unit")
             sizes = (
@@ -430,6 +435,10 @@ class _Reader:
         else:
             self.remarks.add(remark)
 
+    def _leave_out(self, temperature: str, remark: aqdef.Remark) -> None:
+        self.remarks.add(remark)
+        self.left_out.setdefault(temperature, Repeats()).add(remark)
+
     # --- one reading
 
     def _take(
@@ -462,7 +471,7 @@ class _Reader:
                     put(body, field_, read)
                 elif words := form.left_out(field_, value):
                     column = self.settings.columns.get(field_, field_)
-                    self._remark(aqdef.Remark(line, column, str(value)[:40], words))
+                    self._leave_out(field_, aqdef.Remark(line, column, str(value)[:40], words))
             except Unreadable as error:
                 column = self.settings.columns.get(field_, field_ if name == EVERY or "measured" in fields else name)
                 self._fault(line, column, f"{error}.", str(value)[:40])

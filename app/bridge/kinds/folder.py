@@ -24,6 +24,7 @@ from pathlib import Path
 from typing import Final, NamedTuple, TypeVar
 
 from app.bridge.configuration import Machine
+from app.bridge.fields import left_out_since
 from app.bridge.file_content import NAMES, NOT_ALONE, Content, Settings, read_content
 from app.bridge.file_rows import Fault, reasons
 from app.bridge.links import STOPPING, Clock, ControlAway, Decided, Misconfigured, Order, Outcome, Position, Received
@@ -73,7 +74,6 @@ class Folder:
         self.machine = machine
         self.settings: Settings = machine.settings
         self.clock = Clock()
-        self.remark = ""
         self.path = Path(self.settings.path)
         self._known: dict[str, _Known] = {}
         self._locked: dict[str, tuple[float, str]] = {}
@@ -82,9 +82,16 @@ class Folder:
         self._grown: dict[str, tuple[str, str]] = {}  # digest and stamp of what is stored of files that changed since
         self._reading = ""  # the file that is being read
         self._unmoved = ""
+        self._link = ""  # one that is not followed
+        self._left_out: dict[str, str] = {}
         self._looked = 0.0
         self._pool: ThreadPoolExecutor | None = None
         self._work: Future[object] | None = None
+
+    @property
+    def remark(self) -> str:
+        """A link that is not followed, and temperatures that are left out, in words."""
+        return " ".join(filter(None, (self._link, *self._left_out.values())))
 
     async def connect(self) -> str:
         """Look if the folder is there; answer what `IDENTITY` in it says, or else its path."""
@@ -245,6 +252,7 @@ class Folder:
                 continue
             if content.entries or content.faults:
                 self._taken[seen.name] = (seen, content)
+                self._note_temperatures(seen.name, content)
                 return content.received(self.machine.key, seen.name)
             self._stored[seen.name] = (seen, content)  # all of it is passed over
         late = [(name, why) for name, (since, why) in self._locked.items() if now - since >= LOCKED_FOR]
@@ -275,7 +283,7 @@ class Folder:
                     groups.setdefault(f"{path.stem.lower()}.df" if pair else path.name, []).append(path)
         except FileNotFoundError:
             raise ControlAway(f"The folder {self.path} is gone: is the share mounted?") from None
-        self.remark = (
+        self._link = (
             f"{min(links)} is a link, which is not followed: put the file itself into {self.path}." if links else ""
         )
         found = []
@@ -333,6 +341,13 @@ class Folder:
         if (content.faults or not content.complete) and unchanged < self.settings.settle:
             return None
         return content
+
+    def _note_temperatures(self, name: str, content: Content) -> None:
+        if content.faults:
+            return  # nothing of it is stored
+        for entry in content.entries:
+            self._left_out = left_out_since(self._left_out, entry.body, {})
+        self._left_out |= {field: f"File {name}, {words}." for field, words in content.left_out.items()}
 
     def _is_as_seen(self, seen: Seen) -> bool:
         stats = [path.lstat() for path in seen.paths if is_plain(path)]

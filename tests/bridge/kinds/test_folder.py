@@ -593,6 +593,39 @@ def test_files_that_cannot_be_moved_hold_up_no_others_and_are_told(tmp_path: Pat
     run(work())
 
 
+TEMPERATURES = {"characteristic": "feature", "measured": "actual", "part": "part", "part_temperature": "temp"}
+
+
+def test_a_temperature_that_is_left_out_is_logged_once_and_reported_until_a_good_one_comes(
+    tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    head = "feature;actual;part;temp\n"
+    words = "File a.csv, lines 2, 3, temp: '21.5' is no number of °C, with decimal = \",\"; left out."
+
+    async def work() -> None:
+        store = store_in(tmp_path)
+        watched = tmp_path / "watched"
+        watched.mkdir()
+
+        def measure(name: str, *lines: str) -> None:
+            write(watched / name, "\n".join([head.strip(), *lines, ""]))
+
+        async with fetching(machine(watched, columns=TEMPERATURES), store) as unit:
+            measure("a.csv", "D40;40,0123;P1;21.5", "D40;40,0124;P2;21.6", "D40;40,0125;P3;21,7")
+            await until(lambda: unit.detail == words, "the temperature is named")
+            measure("b.csv", "D40;40,0126;P4;")
+            await until((watched / "done" / "b.csv").exists, "a file without a temperature")
+            assert unit.detail == words
+            measure("c.csv", "D40;40,0127;P5;21,8")
+            await until(lambda: not unit.detail, "a good temperature")
+        assert len(await sizes(store)) == 5
+        store.close()
+
+    with caplog.at_level("INFO"):
+        run(work())
+    assert sum(words in each.getMessage() for each in caplog.records) == 1
+
+
 SECRET = "inband_the-key-of-the-machine;x\nmore;of it\n"
 
 
