@@ -114,4 +114,4 @@ def left_out_since(before: Mapping[str, str], body: Mapping[str, Any], left_out:
     {'machine_temperature': 'b'}
     """
     good = body.get("context", {})
-    return {field: words for field, words in before.items() if field not in good} | left_out
+    return {field: words for field, words in before.items() if field not in good} | dict(left_out)

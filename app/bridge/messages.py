@@ -3,6 +3,7 @@
 import hashlib
 import json
 from collections.abc import Iterator, Mapping
+from types import MappingProxyType
 from typing import Any, Final, NamedTuple
 
 from app.bridge.fields import EVERY, Form, put
@@ -38,14 +39,14 @@ LARGEST: Final = 65_536  # bytes of a message
 class Found(NamedTuple):
     """One reading of a message. said: its key as the message says it, by which the sender knows it. fault: why it is none.
 
-    remark: a temperature that is left out.
+    left_out: temperatures, in words by field.
     """
 
     key: str | None
     said: str | int | None
     body: dict[str, Any]
     fault: str | None = None
-    remark: str = ""
+    left_out: Mapping[str, str] = MappingProxyType({})
 
 
 class WrongMessage(ValueError):
@@ -160,7 +161,7 @@ def _mapped(
             yield Found(None, None, {}, f"{name!r} is not named in machine.{machine}.characteristics. Add it there.")
             continue
         body: dict[str, Any] = {"characteristic": key}
-        wrong, remark = "unit", ""
+        wrong, left_out = "unit", dict[str, str]()
         try:
             own = form.in_unit(unit_in(fields.get("measured", name)), told.get("unit", unit))
             for field, value in {**told, "measured": size}.items():
@@ -168,8 +169,8 @@ def _mapped(
                     wrong = f"{field} = {json.dumps(value, ensure_ascii=False)[:40]}"
                     if (read := own.value(field, "" if value is None else value)) is not None:
                         put(body, field, read)
-                    elif left_out := own.left_out(field, value):
-                        remark = f"{wrong} {left_out}."
+                    elif of_value := own.left_out(field, value):
+                        left_out[field] = f"{wrong} {of_value}."
         except (Unreadable, UnknownUnit) as error:
             words = error if isinstance(error, Unreadable) else f"{error.word}, in the name of the member, is no length"
             yield Found(None, None, {}, f"{wrong} {words}.")
@@ -184,7 +185,7 @@ def _mapped(
         whole = first if alone else f"{first}:{name}"
         if len(whole) > LONGEST_KEY:
             whole = f"{machine}:{_digest(whole.encode())}"
-        yield Found(whole, said if alone and said is not None else whole, body, remark=remark)
+        yield Found(whole, said if alone and said is not None else whole, body, left_out=left_out)
 
 
 def _unit_beside(content: Any, path: str) -> Any:

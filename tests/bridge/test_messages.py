@@ -93,7 +93,7 @@ def test_a_temperature_is_a_circumstance_and_costs_no_reading(sent: object, cont
     [found] = foreign({"v": 40.0, "id": 12, "t": sent}, {"measured": "v", "key": "id", "part_temperature": "t"})
     assert found.fault is None
     assert found.body.get("context") == context
-    assert bool(found.remark) == bool(sent and not context), "what is left out is said"
+    assert bool(found.left_out) == bool(sent and not context), "what is left out is said"
 
 
 def test_a_cell_of_a_sensor_that_failed_costs_no_reading() -> None:

@@ -27,7 +27,7 @@ from paho.mqtt.packettypes import PacketTypes
 from paho.mqtt.properties import Properties
 
 from app.bridge.configuration import Location, Machine, Number, Positive
-from app.bridge.fields import FIELDS, Form
+from app.bridge.fields import FIELDS, Form, left_out_since
 from app.bridge.links import Clock, ControlAway, Decided, LinkError, Misconfigured, Order, Outcome, Position, Received
 from app.bridge.messages import foreign_readings, object_in, own_reading
 from app.bridge.moments import learn_ahead
@@ -116,7 +116,7 @@ class MqttLink:
         self.machine = machine
         self.settings: Settings = machine.settings
         self.clock = Clock()
-        self.remark = ""
+        self._left_out: dict[str, str] = {}
         self.base = f"{self.settings.prefix}/{self.settings.name or machine.key}"
         self.port = self.settings.port or (8883 if self.settings.tls else 1883)
         self.where = f"{self.settings.host}:{self.port}"
@@ -133,6 +133,11 @@ class MqttLink:
         self._offered: tuple[Sequence[Order], float] | None = None
         self._taken_over = -OTHERS_TURN
         self._echo: tuple[str, bytes, asyncio.Event] | None = None
+
+    @property
+    def remark(self) -> str:
+        """Temperatures that are left out, in words."""
+        return " ".join(self._left_out.values())
 
     # --- connection
 
@@ -325,7 +330,7 @@ class MqttLink:
             found = [own_reading(payload, machine.characteristics, self._form)]
         received = []
         for index, each in enumerate(found):
-            self.remark = each.remark or self.remark
+            self._left_out = left_out_since(self._left_out, each.body, each.left_out)
             if each.fault is None and each.key is not None:
                 received.append(Received(each.key, each.body, mark=(message, each.said)))
                 continue

@@ -17,7 +17,7 @@ from typing import Any, Literal
 
 from app.bridge import sources
 from app.bridge.configuration import Machine
-from app.bridge.fields import EVERY, Form, put
+from app.bridge.fields import EVERY, Form, left_out_since, put
 from app.bridge.links import Clock, ControlAway, LinkError, Misconfigured, Order, Outcome, Position, Received
 from app.bridge.patterns import LONGEST_LINE, Patterns, TooSlow, check_expressions
 from app.bridge.sources import Source, source_of
@@ -101,7 +101,7 @@ class TextLink:
         self._source: Source[Line] | None = None
         self._unstored: list[Received] = []
         self._lines = self._found = self._damaged = 0
-        self._left_out = ""  # the last temperature
+        self._left_out: dict[str, str] = {}
 
     async def connect(self) -> str:
         """Open the source; what it is called."""
@@ -154,6 +154,7 @@ class TextLink:
             said = f"names no characteristic that {where} has" if name == EVERY else f"{name!r} is not named in {where}"
             return self._refused(line, f'{said}. Add it there, or set others = "skip".')
         body: dict[str, Any] = {"characteristic": key}
+        left_out: dict[str, str] = {}
         field, value = "unit", fields.get("unit", "")
         try:
             form = self._form.in_unit(value)
@@ -163,9 +164,10 @@ class TextLink:
                 if (read := form.value(field, value)) is not None:
                     put(body, field, read)
                 elif words := form.left_out(field, value):
-                    self._left_out = f"{field} {value[:40]!r} {words}."
+                    left_out[field] = f"{field} {value[:40]!r} {words}."
         except Unreadable as error:
             return self._refused(line, f"{field} {value[:40]!r} {error}.")
+        self._left_out = left_out_since(self._left_out, body, left_out)
         if "key" in fields:
             parts = [fields["key"], name]
         elif body.keys() & {"measured_at", "machined_at", "part"}:
@@ -185,8 +187,7 @@ class TextLink:
             words.append(
                 f"Of {self._lines} lines that came none holds a reading as an expression of lines describes it."
             )
-        if self._left_out:
-            words.append(self._left_out)
+        words += self._left_out.values()
         if self._damaged:
             words.append(f"Lines longer than {LONGEST_LINE} characters since the start: {self._damaged}. Baud rate?")
         return " ".join(words)

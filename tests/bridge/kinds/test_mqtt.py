@@ -263,6 +263,26 @@ def test_messages_of_another_form_and_topic_become_readings(tmp_path: Path) -> N
     run(work())
 
 
+def test_a_temperature_that_is_left_out_is_reported_until_a_good_one_comes(tmp_path: Path) -> None:
+    fields = {"characteristic": "f", "measured": "d40", "key": "id", "part_temperature": "t"}
+
+    async def work() -> None:
+        async with (
+            Broker(tmp_path) as broker,
+            connected(machine(broker.port, fields=fields, readings="gauges/1", prefix="gauges")) as there,
+            aiomqtt.Client("127.0.0.1", broker.port) as client,
+        ):
+            for number, (sent, words) in enumerate(
+                [(21.4, ""), ("21,5", "part_temperature"), (None, "part_temperature"), (21.6, "")]
+            ):
+                await client.publish("gauges/1", json.dumps({"f": 1, "d40": 40.01, "id": number, "t": sent}), qos=1)
+                [received] = await fetched(there)
+                assert received.fault is None
+                assert there.remark.partition(" ")[0] == words
+
+    run(work())
+
+
 def test_sizes_are_in_the_unit_of_the_machine(tmp_path: Path) -> None:
     async def work() -> None:
         async with Broker(tmp_path) as broker, connected(machine(broker.port, unit="inch")) as there:

@@ -97,12 +97,29 @@ def test_parity_and_signs_of_a_handshake_are_left_out() -> None:
     assert sizes(printed("Maß\nD40 ACTUAL 40.0\n".encode("cp1252"), encoding="cp1252")) == [("shaft-1", 40.0, None)]
 
 
-def test_a_temperature_that_is_left_out_is_said() -> None:
-    link = TextLink(machine(lines=[r"(?P<characteristic>\w+) (?P<measured>\S+) AT (?P<part_temperature>\S+)"]))
-    link._source = Canned(link, b"D40 40.0 AT 21,5\n")
-    [found] = run(link.fetch(Position()))
-    assert "context" not in found.body
-    assert link.remark == "part_temperature '21,5' is no number of °C, with decimal = \".\"; left out."
+def test_a_temperature_that_is_left_out_is_reported_until_a_good_one_comes() -> None:
+    both = r"(?P<characteristic>\w+) (?P<measured>\S+) AT (?P<part_temperature>\S*) OF (?P<machine_temperature>\S*)"
+    link = TextLink(machine(lines=[both]))
+    part, of_machine = (
+        f"{name}_temperature '{value}' is no number of °C, with decimal = \".\"; left out."
+        for name, value in (("part", "21,5"), ("machine", "---"))
+    )
+    link._source = Canned(
+        link,
+        b"D40 40.0 AT 21,5 OF ---\n",
+        b"D40 40.0 AT  OF 20.5\n",
+        b"D40 4-0 AT 21.5 OF x\n",
+        b"D40 40.0 AT 21.5 OF 20.5\n",
+    )
+
+    async def work() -> None:
+        [found] = await link.fetch(Position())
+        assert "context" not in found.body
+        for remark in (f"{part} {of_machine}", part, part, ""):  # the third line is refused: it holds no reading
+            assert link.remark == remark
+            await link.fetch(Position())
+
+    run(work())
 
 
 def test_what_is_wrong_goes_to_the_quarantine_with_its_line() -> None:
