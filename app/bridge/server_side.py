@@ -281,8 +281,9 @@ async def heartbeat(unit: Unit) -> dict[str, Any]:
 
 
 def _detail(unit: Unit) -> str:
-    said = " ".join(filter(None, (unit.detail, *(each.reason for each in unit.held_back))))
-    return said or unit.trouble or (unit.context.summary() if unit.context else "")
+    """The control's side, then the server's, each sentence once; where all is well, what the agent says."""
+    sentences = (unit.detail, unit.trouble, *(each.reason for each in unit.held_back))
+    return " ".join(dict.fromkeys(filter(None, sentences))) or (unit.context.summary() if unit.context else "")
 
 
 def _sensible(offset: float | None) -> float | None:

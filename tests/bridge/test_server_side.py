@@ -17,7 +17,7 @@ from app.bridge import offering, server_side
 from app.bridge.configuration import Server
 from app.bridge.links import Decided, Order, Outcome, Position, Received
 from app.bridge.store import Store
-from app.bridge.unit import Unit, ended
+from app.bridge.unit import HeldBack, Unit, ended
 from app.loop.connections.schemas import HeartbeatIn
 from app.loop.tools.schemas import RejectionIn
 from app.simulators.controls.model import Feature, Model
@@ -525,6 +525,17 @@ def test_corrections_are_asked_for_when_a_decision_concerns_them(
         assert server.heard == [("push", "k1")]
 
     run(story())
+
+
+def test_a_remark_on_the_control_hides_no_trouble_with_the_server(tmp_path: Path) -> None:
+    async def detail(said: str, trouble: str) -> Any:
+        unit = unit_of(Model(), store_in(tmp_path))
+        unit.detail, unit.trouble = said, trouble
+        unit.held_back = (HeldBack(3, 18, "Correction 18 waits."),)
+        return (await server_side.heartbeat(unit))["detail"]
+
+    assert run(detail("A gap.", "It refuses.")) == "A gap. It refuses. Correction 18 waits."
+    assert run(detail("The store is full.", "The store is full.")) == "The store is full. Correction 18 waits."
 
 
 def test_a_heartbeat_is_taken_whatever_a_control_has_sent(tmp_path: Path) -> None:
