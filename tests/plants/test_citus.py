@@ -173,7 +173,7 @@ class TestPlantOnANode:
             assert (answer.status_code, answer.json()["sequence"]) == (201, sequence), answer.text
         (alarm,) = client.get(f"/api/v1/alarms?characteristic={seat}").json()["items"]
         assert (alarm["count"], alarm["last_sequence"]) == (2, 2)
-        assert alarm["last_at"] == answer.json()["received_at"]
+        assert alarm["raised_at"] < alarm["last_at"] == answer.json()["received_at"]
 
     def test_context_is_kept_there_and_filled_in(self, client: httpx.Client, server: Server) -> None:
         seat = seat_of(client, "work")

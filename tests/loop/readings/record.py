@@ -91,6 +91,7 @@ BROKEN = (
            -- the machine named another offset for what a reading had confirmed
            SELECT FROM alarm a WHERE a.machine_id = c.machine_id AND a.tool_memory = c.tool_memory AND a.kind = 'offset_differs'
        ))::int <> (c.status = 'applied')::int""",
+    "SELECT * FROM alarm WHERE last_at < raised_at",
     # one active alarm for one trouble, counted as often as readings name it
     """SELECT machine_id, characteristic_id, kind FROM alarm
        WHERE acknowledged_at IS NULL AND (characteristic_id IS NOT NULL OR tool_memory IS NOT NULL)

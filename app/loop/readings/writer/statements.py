@@ -279,10 +279,12 @@ SELECT machine_id, number, at, 'correction', offset_before, offset_after, correc
 FROM json_to_recordset($1) AS r(machine_id int, number int, at timestamptz, offset_before float8,
     offset_after float8, correction int, actor text)
 """
-# last_at: when the readings that raise it were received, so that none of them comes after it.
+# raised_at, last_at: when the readings that raise it were received, so that none of them comes after it, and by one clock.
 RAISE = """
-INSERT INTO alarm (machine_id, id, kind, characteristic_id, tool_memory, count, sequence, last_sequence, last_at, data)
-SELECT * FROM json_to_recordset($1) AS r(machine_id int, id bigint, kind text, characteristic_id int, tool_memory int,
+INSERT INTO alarm (
+    machine_id, id, kind, characteristic_id, tool_memory, count, sequence, last_sequence, raised_at, last_at, data)
+SELECT machine_id, id, kind, characteristic_id, tool_memory, count, sequence, last_sequence, last_at, last_at, data
+FROM json_to_recordset($1) AS r(machine_id int, id bigint, kind text, characteristic_id int, tool_memory int,
     count int, sequence bigint, last_sequence bigint, last_at timestamptz, data jsonb)
 """
 # The sentence tells the newest reading, as the correction that is held does; a tool's alarm keeps the one that raised it.
