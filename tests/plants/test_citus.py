@@ -31,6 +31,7 @@ from tests.loop.readings.load import Sender, all_at_once, scattered
 from tests.loop.readings.record import history, must_replay
 from tests.plants.nodes import PROGRAMS, nodes, place
 from tests.shop import PARAMETERS
+from tests.web.test_live import stream
 
 needs_citus = pytest.mark.skipif(not PROGRAMS, reason="INBAND_TEST_CITUS names no PostgreSQL with Citus")
 
@@ -207,14 +208,11 @@ class TestPlantOnANode:
         assert marks[0]["last_event"] >= newest
         assert marks[0]["system"] == marks[1]["system"] != own
 
-    def test_live_events_are_told_at_once(self, client: httpx.Client) -> None:
-        pushing = threading.Timer(1, push, (client, 3))
-        pushing.start()
-        with client.stream("GET", "/api/v1/events") as events:
-            for line in events.iter_lines():
-                if line.startswith("data:") and "shaft" in line:
-                    break
-        pushing.join()
+    def test_live_events_come_as_they_happen(self, client: httpx.Client) -> None:
+        with stream(client) as events:  # its greeting has come: it listens
+            pushed = {"characteristic": "shaft", "sequence": push(client, 3)}
+            while not pushed.items() <= events.next("reading").data.items():
+                pass  # what was done just before comes first
 
     def test_a_key_that_comes_again_is_answered_as_before(self, client: httpx.Client) -> None:
         def send(number: int) -> tuple[int, int]:
