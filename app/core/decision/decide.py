@@ -28,7 +28,7 @@ from collections.abc import Iterable
 from enum import StrEnum
 from typing import NamedTuple
 
-from app.core.decision.limits import FAULT, WEAR, ZONES, Zone, within_tolerance
+from app.core.decision.limits import FAULT, WEAR, ZONES, Zone, nanometres, within_tolerance
 from app.core.decision.step import (
     ACTIONS,
     BELIEVED,
@@ -175,6 +175,20 @@ def decide(
         made.clamped,
         good,
         tuple(alarms),
+    )
+
+
+def voids_corrections(old: Parameters, new: Parameters) -> bool:
+    """Tell if corrections that were computed under the old parameters, and are not in the offset yet, must stay out of it.
+
+    They lead to another target, move another tool or the other way; or nothing is to be corrected any more, or only what
+    somebody has approved.
+    """
+    return (
+        nanometres(old.target) != nanometres(new.target)
+        or (old.factor, old.tool_memory) != (new.factor, new.tool_memory)
+        or new.measures_only
+        or (needs_approval(new) and not needs_approval(old))
     )
 
 

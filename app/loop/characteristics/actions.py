@@ -7,6 +7,7 @@ from sqlalchemy import func, update
 from sqlalchemy.orm import Session
 
 from app.access.audit.actions import record
+from app.core.decision.decide import voids_corrections
 from app.core.decision.limits import nanometres
 from app.core.fits import with_fit
 from app.core.natural import target_of
@@ -26,6 +27,7 @@ from app.db.events import publish
 from app.errors import Conflict, FieldError, Invalid
 from app.language.i18n import _
 from app.loop.characteristics import form_actions, queries, wording
+from app.loop.characteristics.corrections import correction_changed, open_corrections, supersede
 from app.loop.characteristics.form_actions import parameters_of_form, refused_for_form
 from app.loop.characteristics.queries import CurrentCharacteristic
 from app.loop.characteristics.schemas import CharacteristicChange, CharacteristicIn, warnings_of
@@ -257,7 +259,7 @@ def _change_parameters(
     if not reason:
         wrong = _("is required when parameters change: say why, for those who read it in a year")
         errors.append(FieldError("reason", wrong))
-    if errors or new is None:
+    if errors or new is None or not reason:
         raise _refused(errors)
     new_version = _new_version(characteristic, version.version + 1, new, actor, reason)
     session.add(new_version)
@@ -288,6 +290,16 @@ def _change_parameters(
         _restart_average(session, machine.id, new.average_memory)
         changes.append({"kind": "average", "machine": machine.key, "average_memory": new.average_memory})
     before, after = _differences(old.as_dict(), new.as_dict())
+    if voids_corrections(old, new):
+        fallen = supersede(
+            session,
+            open_corrections(session, machine, characteristic=characteristic),
+            new_version.created_at,
+            actor,
+            reason,
+        )
+        changes += [correction_changed(session, machine, correction) for correction in fallen]
+        after |= {"superseded": [correction.number for correction in fallen]} if fallen else {}
     record(session, actor, "parameters changed", f"characteristic/{characteristic.key}", before, after, reason)
     return now, changes
 

@@ -5,7 +5,7 @@ from typing import Annotated
 from fastapi import Query, Response
 
 from app.access.deps import AnyCaller, Engineer
-from app.loop.characteristics import actions, queries
+from app.loop.characteristics import actions, corrections, queries
 from app.loop.characteristics.schemas import (
     CharacteristicChange,
     CharacteristicIn,
@@ -60,9 +60,14 @@ def get_characteristic(session: SessionDep, caller: AnyCaller, characteristic: C
 def change_characteristic(
     session: SessionDep, caller: Engineer, characteristic: CharacteristicKey, change: CharacteristicChange
 ) -> CharacteristicOut:
-    """Change it. `parameters` make a new version and need a `reason`; old readings keep the version they were judged by."""
+    """Change it. `parameters` make a new version and need a `reason`; old readings keep the version they were judged by.
+
+    With another target, factor or tool, and where corrections end or need approval from now on, open corrections of this
+    characteristic are superseded; a warning names them.
+    """
     current = actions.change_characteristic(session, characteristic, change, caller.name)
-    return characteristic_out(current, queries.target_before(session, current), change.parameters)
+    fallen = corrections.superseded_with(session, current) if change.parameters else ()
+    return characteristic_out(current, queries.target_before(session, current), change.parameters, fallen)
 
 
 @router.get("/characteristics/{characteristic}/parameters", responses=problems(404))

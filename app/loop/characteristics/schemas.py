@@ -1,6 +1,6 @@
 """Characteristics as JSON. The parameters' schema is made from the core's table of them."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from datetime import datetime
 from typing import Annotated, Any, Literal
 
@@ -184,11 +184,15 @@ class VersionOut(BaseModel):
 
 
 def warnings_of(
-    current: queries.CurrentCharacteristic, before: float | None = None, given: Mapping[str, Any] | None = None
+    current: queries.CurrentCharacteristic,
+    before: float | None = None,
+    given: Mapping[str, Any] | None = None,
+    superseded: Sequence[int] = (),
 ) -> list[WarningOut]:
     """Warn of what is outside the ranges of the sources, does not fit the machine, or is finer than its probe tells.
 
     before: the target of the version before, mm; one that is the same in inches is named. given: what was sent just now.
+    superseded: corrections that fell with it, by number.
     """
     parameters, machine = current.parameters, current.machine
     try:
@@ -205,13 +209,16 @@ def warnings_of(
         place = {"value": parameters.tool_memory, "machine": machine.key}
         unusual.append(Problem("tool_memory", "not_mapped", place, warning=True))
     inches = [] if before is None else inch_warnings([("parameters.target", parameters.target, before)])
-    return [*warnings_out(inches, sentence), *wording.warnings(unusual)]
+    return [*warnings_out(inches, sentence), *wording.warnings(unusual), *wording.superseded_warnings(superseded)]
 
 
 def characteristic_out(
-    current: queries.CurrentCharacteristic, before: float | None = None, given: Mapping[str, Any] | None = None
+    current: queries.CurrentCharacteristic,
+    before: float | None = None,
+    given: Mapping[str, Any] | None = None,
+    superseded: Sequence[int] = (),
 ) -> CharacteristicOut:
-    """Return a characteristic as it is answered. before, given: as `warnings_of` has them."""
+    """Return a characteristic as it is answered. before, given, superseded: as `warnings_of` has them."""
     characteristic, machine, version, _mapped, source = current
     return CharacteristicOut(
         key=characteristic.key,
@@ -225,7 +232,7 @@ def characteristic_out(
         else FormOf(characteristic=source, result=FormResult(characteristic.form)),
         parameters_version=version.version,
         created_at=characteristic.created_at,
-        warnings=warnings_of(current, before, given),
+        warnings=warnings_of(current, before, given, superseded),
     )
 
 

@@ -6,7 +6,7 @@ from typing import Any, NamedTuple, Protocol, TypeVar
 
 from app.core.parameters import BY_NAME, TWO_POINT_SWITCH, Field, FieldKind, Problem, Variant, mean_nominal
 from app.errors import FieldError
-from app.language.i18n import _
+from app.language.i18n import _, ngettext
 from app.language.numbers import typed_length
 from app.web.warnings import WarningOut
 
@@ -175,6 +175,19 @@ def warnings(problems: Iterable[Problem]) -> list[WarningOut]:
         WarningOut(code=problem.code, text=sentence(problem), field=f"parameters.{problem.field}")
         for problem in problems
     ]
+
+
+def superseded_warnings(numbers: Sequence[int]) -> list[WarningOut]:
+    """The warning of corrections that fell because parameters changed; none without such."""
+    if not numbers:
+        return []
+    text = ngettext(
+        "Correction {numbers} was computed with the parameters before and is superseded: it must not be in the offset.",
+        "Corrections {numbers} were computed with the parameters before and are superseded: they must not be in the offset.",
+        len(numbers),
+    )
+    named = ", ".join(map(str, numbers))
+    return [WarningOut(code="corrections_superseded", text=text.format(numbers=named), field="parameters")]
 
 
 def _where(problem: Problem) -> str:

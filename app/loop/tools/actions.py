@@ -19,6 +19,7 @@ from app.db.events import publish
 from app.errors import Conflict
 from app.language.i18n import _
 from app.loop.alarms.reading_kinds import TOOL_WORN
+from app.loop.characteristics.corrections import correction_changed, open_corrections, supersede
 from app.loop.characteristics.queries import parts_cut
 from app.loop.machines.queries import lock_machines
 from app.loop.readings import queries as reading_queries
@@ -28,8 +29,7 @@ from app.loop.tables.readings import Reading, Stream
 from app.loop.tables.tools import OPEN, AverageMemory, Correction, Tool, ToolEvent
 from app.loop.tools import queries, wording
 from app.loop.tools.alarm_kinds import PAUSING
-from app.loop.tools.events import average_changed, correction_changed, tool_changed
-from app.loop.tools.superseding import supersede
+from app.loop.tools.events import average_changed, tool_changed
 
 Verb = Literal["rejected", "approve", "release"]
 FROM: dict[str, tuple[str, ...]] = {"rejected": OPEN, "approve": ("awaiting_approval",), "release": ("held",)}
@@ -175,7 +175,7 @@ def _set_offset(
             reason=reason,
         )
     )
-    fallen = supersede(session, machine, number, now, caller.name, reason)
+    fallen = supersede(session, open_corrections(session, machine, number), now, caller.name, reason)
     averages = restart_averages(
         session, machine, session.scalars(select(Stream.average_memory).where(on_it).distinct()).all(), now
     )

@@ -18,6 +18,7 @@ from app.db.events import publish
 from app.errors import Conflict
 from app.language.i18n import _
 from app.loop.alarms import actions as alarms
+from app.loop.characteristics.corrections import correction_changed, open_corrections, supersede
 from app.loop.machines.queries import lock_machines
 from app.loop.tables.alarms import Alarm
 from app.loop.tables.machines import Machine
@@ -25,9 +26,8 @@ from app.loop.tables.tools import Correction, Tool, ToolEvent
 from app.loop.tools import queries, wording
 from app.loop.tools.actions import Decided, locked, must_be, record_status
 from app.loop.tools.alarm_kinds import OFFSET_DIFFERS
-from app.loop.tools.events import alarm_raised, correction_changed, tool_changed
+from app.loop.tools.events import alarm_raised, tool_changed
 from app.loop.tools.queries import OFFSET_TOLERANCE
-from app.loop.tools.superseding import supersede
 
 BY_READING = "reading "  # how `applied_by` begins when a reading confirmed it (`correction_in_effect`)
 
@@ -102,7 +102,7 @@ def _leading_to(
 ) -> list[Correction]:
     """The pending corrections beyond number `after` that lead from `running` to this offset; none if they do not."""
     led: list[Correction] = []
-    for waiting in queries.open_corrections(session, machine, tool.number):
+    for waiting in open_corrections(session, machine, tool.number):
         if waiting.status == "pending" and waiting.number > after:
             led.append(waiting)
             running = round(running + waiting.amount, DECIMALS)
@@ -163,7 +163,13 @@ def _pause(
         },
     )
     tool.paused_by = alarm.id
-    return alarm, supersede(session, machine, tool.number, datetime.now(UTC), None, f"{wording.PAUSED} {alarm.id}")
+    return alarm, supersede(
+        session,
+        open_corrections(session, machine, tool.number),
+        datetime.now(UTC),
+        None,
+        f"{wording.PAUSED} {alarm.id}",
+    )
 
 
 class Report(NamedTuple):

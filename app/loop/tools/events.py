@@ -2,28 +2,8 @@
 
 from typing import Any
 
-from sqlalchemy import select
-from sqlalchemy.orm import Session
-
 from app.loop.tables.alarms import Alarm
-from app.loop.tables.characteristics import Characteristic
 from app.loop.tables.machines import Machine
-from app.loop.tables.tools import Correction
-
-
-def correction_changed(session: Session, machine: Machine, correction: Correction) -> dict[str, Any]:
-    return {
-        "kind": "correction",
-        "machine": machine.key,
-        "characteristic": session.scalar(
-            select(Characteristic.key).where(
-                Characteristic.machine_id == machine.id, Characteristic.id == correction.characteristic_id
-            )
-        ),
-        "tool": correction.tool_memory,
-        "number": correction.number,
-        "status": correction.status,
-    }
 
 
 def tool_changed(machine: Machine, number: int) -> dict[str, Any]:

@@ -27,6 +27,7 @@ from app.core.programs.corrections import (
 from app.db.events import publish
 from app.errors import Conflict, Invalid
 from app.language.i18n import _
+from app.loop.characteristics.corrections import correction_changed
 from app.loop.machines.queries import lock_machines
 from app.loop.tables.characteristics import ParametersVersion
 from app.loop.tables.machines import Machine
@@ -34,7 +35,6 @@ from app.loop.tables.readings import Stream
 from app.loop.tables.tools import Correction, Tool
 from app.loop.tools import queries, wording
 from app.loop.tools.applying import mark_applied
-from app.loop.tools.events import correction_changed
 
 AT_LARGE_FOR = timedelta(days=30)  # how long people are reminded of a text whose correction fell
 

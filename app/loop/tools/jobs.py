@@ -11,13 +11,14 @@ from app.core.tool_life import LifeUse, use_of
 from app.db.events import publish
 from app.jobs.actions import PeriodicJob, Unit
 from app.loop.alarms import actions as alarms
+from app.loop.characteristics.corrections import correction_changed
 from app.loop.machines.queries import lock_machines
 from app.loop.tables.machines import Machine
 from app.loop.tables.readings import Stream
 from app.loop.tables.tools import OUTSTANDING, Correction, Tool
 from app.loop.tools import gain_queries, wording
 from app.loop.tools.alarm_kinds import TOOL_LIFE, UNUSUAL_GAIN
-from app.loop.tools.events import alarm_raised, correction_changed
+from app.loop.tools.events import alarm_raised
 from app.loop.tools.lives_queries import plan_of
 
 ACTOR = "inband"

@@ -12,6 +12,7 @@ from app.core.decision.step import rounded
 from app.core.parameters import MOST_LOCATIONS
 from app.errors import NotFound
 from app.language.i18n import _
+from app.loop.characteristics.corrections import open_corrections
 from app.loop.readings import queries as readings
 from app.loop.tables.characteristics import Characteristic
 from app.loop.tables.machines import Machine
@@ -192,14 +193,6 @@ def averages(
         sharing[location].append(key)
     rows = session.scalars(query.execution_options(populate_existing=True))
     return [AverageRow(row, sharing[row.location]) for row in rows]
-
-
-def open_corrections(session: Session, machine: Machine, tool_memory: int | None = None) -> Sequence[Correction]:
-    """Held, awaiting approval and pending ones, oldest first."""
-    query = select(Correction).where(Correction.machine_id == machine.id, Correction.status.in_(OPEN))
-    if tool_memory is not None:
-        query = query.where(Correction.tool_memory == tool_memory)
-    return session.scalars(query.order_by(Correction.number).execution_options(populate_existing=True)).all()
 
 
 def counting_on(session: Session, machine: Machine, correction: Correction) -> list[int]:

@@ -17,13 +17,13 @@ from app.errors import Conflict
 from app.language.i18n import _
 from app.loop.characteristics import actions as characteristics
 from app.loop.characteristics.actions import CharacteristicChange
+from app.loop.characteristics.corrections import correction_changed, open_corrections, supersede
 from app.loop.machines.queries import lock_machines
 from app.loop.tables.characteristics import Characteristic
 from app.loop.tables.machines import Machine
 from app.loop.tables.readings import Stream
 from app.loop.tools import queries
-from app.loop.tools.events import correction_changed, tool_changed
-from app.loop.tools.superseding import supersede
+from app.loop.tools.events import tool_changed
 
 
 class Switched(NamedTuple):
@@ -75,7 +75,7 @@ def switch_to_sister(session: Session, machine: Machine, number: int, reason: st
             _("Look at tool {sister}, its sister: it may have been switched already.").format(sister=tool.sister),
         )
     sister, now = tool.sister, datetime.now(UTC)
-    fallen = supersede(session, machine, number, now, caller.name, reason)
+    fallen = supersede(session, open_corrections(session, machine, number), now, caller.name, reason)
     for key in keys:
         session.flush()
         characteristics.change_characteristic(

@@ -10,6 +10,7 @@ from app.core.decision.step import rounded
 from app.core.parameters import Parameters
 from app.loop.alarms.reading_kinds import HOLDING
 from app.loop.characteristics import queries as characteristics
+from app.loop.characteristics.corrections import open_corrections
 from app.loop.machines import queries as machines
 from app.loop.tables.alarms import Alarm
 from app.loop.tables.characteristics import Characteristic
@@ -73,7 +74,7 @@ def _of_machine(session: Session, machine: Machine) -> list[Group]:
     for entry in _with_readings(session, machine, rows):
         by_tool.setdefault(entry.row.correction.tool_memory, []).append(entry)
     pending = dict.fromkeys(by_tool, 0.0)
-    for correction in queries.open_corrections(session, machine):
+    for correction in open_corrections(session, machine):
         if correction.status == "pending" and correction.tool_memory in pending:
             pending[correction.tool_memory] += correction.amount
     result = []

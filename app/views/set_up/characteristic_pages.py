@@ -19,6 +19,7 @@ from app.errors import Conflict, InbandError, Invalid
 from app.language.i18n import _
 from app.loop.characteristics import actions, queries
 from app.loop.characteristics.actions import CharacteristicChange, CharacteristicIn
+from app.loop.characteristics.corrections import superseded_with
 from app.loop.characteristics.wording import history, result_label
 from app.loop.machines import queries as machines
 from app.loop.programs import queries as programs
@@ -268,7 +269,11 @@ def _characteristic(
         version=current.version,
         in_force_measures_only=current.parameters.measures_only,
         problem=problem,
-        warnings=actions.warnings_of(current, queries.target_before(session, current)),
+        warnings=actions.warnings_of(
+            current,
+            queries.target_before(session, current),
+            superseded=superseded_with(session, current) if request.query_params.get("done") == "changed" else (),
+        ),
         history=history(queries.versions(session, characteristic)),
         program=programs.program_view(current),
         proposals=[
