@@ -8,6 +8,7 @@ from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from typing import Any
 
+import psycopg
 import pytest
 
 from app.jobs.runner import JobRunner
@@ -111,6 +112,29 @@ def test_a_short_walk(plant: InProcess) -> None:
     walk(plant, 1, 40)
 
 
+def test_a_record_that_does_not_hold_is_found(plant: InProcess) -> None:
+    shop, dsn = Shop(plant), plant.database.dsn
+    first = shop.read(6.0)["correction"]["number"]
+    shop.read(0.0, correction_in_effect=first)
+    shop.correction(first, "applied", offset_after=0.05)
+    (alarm,) = shop.alarms()
+    shop.acknowledge(alarm["id"], "offset_set", offset=0.0, changed_by="Anna")
+    second = shop.read(6.0)["correction"]["number"]
+    shop.correction(second, "applied")
+    shop.call("POST", f"/machines/{shop.machine}/faults", 201, kind="battery_low")
+    must_hold(dsn)
+    alarm_again = """INSERT INTO alarm (machine_id, kind, data) SELECT machine_id, kind, data FROM alarm
+        WHERE acknowledged_at IS NULL"""
+    step_again = """INSERT INTO tool_event (machine_id, number, kind, offset_before, offset_after, correction, actor)
+        SELECT machine_id, number, kind, offset_before, offset_after, correction, actor FROM tool_event
+        WHERE correction = %s"""
+    for statement, values, words in ((alarm_again, (), "'memory'"), (step_again, (second,), "'expected'")):
+        with psycopg.connect(dsn) as connection:
+            connection.execute(statement, values)
+        with pytest.raises(AssertionError, match=words):
+            must_hold(dsn)
+
+
 @pytest.mark.long
 def test_a_long_walk(plant: InProcess) -> None:
     Place(plant)  # with something of everything
@@ -118,6 +142,7 @@ def test_a_long_walk(plant: InProcess) -> None:
     walker = walk(plant, chance.seed(1), 3000, 300)
     corrections, tools = "/api/v1/corrections/{machine}/{number}", "/api/v1/machines/{machine}/tools/{tool}"
     alarms = "POST /api/v1/alarms/{alarm}/acknowledge"
+    assert walker.steps >= 300, "so few say nothing of what was walked"
     assert {alarms, f"POST {corrections}/applied", f"POST {tools}/change", f"PUT {tools}"} <= walker.done()
 
 

@@ -85,18 +85,26 @@ BROKEN = (
     """SELECT t.*, e.* FROM tool t JOIN LATERAL (
            SELECT offset_after FROM tool_event e WHERE e.machine_id = t.machine_id AND e.number = t.number
            ORDER BY id DESC LIMIT 1) e ON true WHERE abs(t."offset" - e.offset_after) > 1e-9""",
-    """SELECT c.machine_id, c.number, count(e.id) FROM correction c LEFT JOIN tool_event e
-           ON e.machine_id = c.machine_id AND e.correction = c.number
-       GROUP BY c.machine_id, c.number, c.tool_memory, c.status HAVING count(e.id) - (count(e.id) = 2 AND EXISTS (
-           -- the machine named another offset for what a reading had confirmed
-           SELECT FROM alarm a WHERE a.machine_id = c.machine_id AND a.tool_memory = c.tool_memory AND a.kind = 'offset_differs'
+    """SELECT c.*, e.* FROM correction c JOIN LATERAL (
+           SELECT count(*) AS n, min(id) AS first, max(id) AS last FROM tool_event
+           WHERE machine_id = c.machine_id AND correction = c.number) e ON true
+       WHERE e.n - (e.n = 2 AND EXISTS (
+           -- a reading had confirmed it with the offset that was expected; then the machine named another one
+           SELECT FROM tool_event r JOIN tool_event m ON m.machine_id = r.machine_id AND m.id = e.last
+           JOIN alarm a ON a.machine_id = r.machine_id AND a.tool_memory = c.tool_memory AND a.kind = 'offset_differs'
+               AND m.at BETWEEN a.raised_at AND a.last_at
+           WHERE r.machine_id = c.machine_id AND r.id = e.first AND r.number = c.tool_memory AND m.number = c.tool_memory
+               AND abs(r.offset_after - r.offset_before - c.amount) < 1e-9 AND m.offset_after = c.offset_after
+               AND (a.count > 1 OR a.data @> jsonb_build_object(  -- of more the last one is kept
+                   'correction', c.number, 'expected', m.offset_before, 'reported', m.offset_after))
        ))::int <> (c.status = 'applied')::int""",
     "SELECT * FROM alarm WHERE last_at < raised_at",
     # one active alarm for one trouble, counted as often as readings name it
-    """SELECT machine_id, characteristic_id, kind FROM alarm
-       WHERE acknowledged_at IS NULL AND (characteristic_id IS NOT NULL OR tool_memory IS NOT NULL)
-       GROUP BY machine_id, characteristic_id, kind, CASE WHEN characteristic_id IS NULL THEN tool_memory END
-       HAVING count(*) > 1""",
+    """SELECT machine_id, kind, about FROM alarm CROSS JOIN LATERAL (SELECT CASE
+           WHEN characteristic_id IS NOT NULL THEN jsonb_build_array('characteristic', characteristic_id)
+           WHEN tool_memory IS NOT NULL THEN jsonb_build_array('tool', tool_memory)
+           ELSE jsonb_build_array(data -> 'memory', data -> 'location') END AS about) a
+       WHERE acknowledged_at IS NULL GROUP BY machine_id, kind, about HAVING count(*) > 1""",
     """SELECT a.*, r.n FROM alarm a JOIN LATERAL (
            SELECT count(*) AS n, max(sequence) AS last FROM reading r WHERE r.machine_id = a.machine_id
                AND r.characteristic_id = a.characteristic_id AND a.id = ANY(r.alarms)) r ON true
