@@ -49,7 +49,7 @@ only through each other's queries and actions. frontend/ and migrations/ lie bes
         notifications    who is notified of which alarm, by mail, webhook or apprise; deliveries on record
         summaries        counts, standard deviations, charts of ten million points
         control_plan     how often each characteristic is measured, and measurements that were missed
-        present_context  the order, batch … that a machine works at, put on readings that bring none
+        present_context  the order, batch … that a machine works at, put on readings that bring temperatures at most
         calibration      empirical values: against a gauge, in a ring, by pairs; calibrations that are due
         faults           faults that a machine reports about itself and its probe
         connections      heartbeats of the bridges beside the machines, and those that fall silent

@@ -1,4 +1,4 @@
-"""Setting what a machine works at, and putting it on its readings that bring no context.
+"""Setting what a machine works at, and putting it on its readings that bring no context but temperatures.
 
 A reading's context is written once and never changed. A reading without any that was measured while it held gets it from a periodic
 job; one that brings temperatures alone gets it with them, when it is stored.

@@ -15,7 +15,7 @@ router = api_router("machines")
 @router.get("/machines/{machine}/context", responses=problems(404) | TAGGED)
 @tagged
 def get_present_context(session: SessionDep, caller: AnyCaller, machine: MachineKey) -> PresentContextOut:
-    """The work of the machine: the context of its readings that bring none."""
+    """The work of the machine: the context of its readings that bring none but temperatures."""
     row = machine_for(session, caller, machine, "viewer")
     return PresentContextOut.of(machine, present_of(session, row.id))
 
@@ -25,9 +25,10 @@ def get_present_context(session: SessionDep, caller: AnyCaller, machine: Machine
 def set_present_context(
     session: SessionDep, caller: AnyCaller, machine: MachineKey, given: PresentContextIn
 ) -> PresentContextOut:
-    """Say what the machine works at from now on; `{}`: nothing is known. Readings that came before keep what they have.
+    """Say what the machine works at from now on; `{}`: nothing is known. Readings that were measured before keep what they have.
 
-    It is put within a minute on readings that bring no context but temperatures; one that brings any other keeps that alone.
+    It is put within a minute on readings that were measured since and bring no context but temperatures; one that brings any other
+    keeps that alone.
     The key of the machine may set it, a bridge or an MES for example.
     """
     row = machine_for(session, caller, machine, "operator")

@@ -82,6 +82,8 @@ class WhatIfIn(SettingsIn):
 
 Every = Annotated[int, Field(strict=True, ge=1, le=1000)]
 Few = Annotated[int, Field(strict=True, ge=0, le=1000)]
+_AFTER_CHANGE = "Every part is measured for N readings after a tool change; the beginning of the period and an offset set by hand count as one."
+_AFTER_ALARM = "The same after an alarm that a reading of this characteristic raises."
 
 
 class SampledIn(WhatIfIn):
@@ -93,19 +95,8 @@ class SampledIn(WhatIfIn):
             default_factory=lambda: list(CHOICES), min_length=1, max_length=50, description="Values of N, a row each."
         ),
     ]
-    after_change: Annotated[
-        Few | None,
-        Field(
-            description="Every part is measured for N readings after a tool change; the beginning of the period and an offset set by "
-            "hand count as one. null: as the control plan says."
-        ),
-    ] = None
-    after_alarm: Annotated[
-        Few | None,
-        Field(
-            description="The same after an alarm that a reading of this characteristic raises; null: as the control plan says."
-        ),
-    ] = None
+    after_change: Annotated[Few | None, Field(description=f"{_AFTER_CHANGE} null: as the control plan says.")] = None
+    after_alarm: Annotated[Few | None, Field(description=f"{_AFTER_ALARM} null: as the control plan says.")] = None
 
 
 class WhatIfByIn(WhatIfIn):
@@ -271,8 +262,8 @@ class SampledOut(PeriodOut):
 
     delay: int = Field(description="Parts between a correction and its effect in the replay.")
     settings: dict[str, float] = Field(description="k, R33, R34 and factor by name.")
-    after_change: Annotated[int, Field(description="Every part is measured for N readings after a tool change.")]
-    after_alarm: Annotated[int, Field(description="The same after an alarm by a reading.")]
+    after_change: Annotated[int, Field(description=_AFTER_CHANGE)]
+    after_alarm: Annotated[int, Field(description=_AFTER_ALARM)]
     rows: Annotated[list[SampledRowOut], Field(description="In the order in which they were asked for.")]
     cautions: Annotated[list[str], Field(description="Limits of these numbers.")]
 
