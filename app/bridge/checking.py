@@ -38,7 +38,8 @@ async def check(configuration: Configuration) -> list[Finding]:
         found = await asyncio.gather(
             *(_of_machine(configuration, machine, alone=alone) for machine in configuration.machines)
         )
-    return [_store(configuration)] + [finding for findings in found for finding in findings]
+    warned = [Finding("configuration", words, False) for words in configuration.warnings]
+    return [*warned, _store(configuration)] + [finding for findings in found for finding in findings]
 
 
 @contextlib.contextmanager

@@ -19,6 +19,7 @@ from app.core.ring import INCH
 KEY = re.compile(r"[a-z0-9][a-z0-9._-]{0,63}")
 Positive = Annotated[float, Meta(gt=0)]
 Number = Annotated[int, Meta(ge=1)]
+LONGEST_HEARTBEAT = 30.0  # s
 T = TypeVar("T")
 MISSING = {
     "unit": ': "mm" or "inch", what the control works in',
@@ -117,14 +118,14 @@ class Machine(Struct, forbid_unknown_fields=True, frozen=True, kw_only=True):
 class Server(Struct, forbid_unknown_fields=True, frozen=True):
     """The server. ca: a file with the certificate of the authority that signed the server's, if it is one of the plant's own.
 
-    ask: how often corrections are asked for that no reading has announced, s. heartbeat: s; the server counts a minute without
-    one as a pause of the machine, and a bridge as silent.
+    ask: how often corrections are asked for that no reading has announced, s. heartbeat: s between two, `LONGEST_HEARTBEAT` at most;
+    the server counts a minute without one as a pause of the machine, and a bridge as silent.
     """
 
     url: str
     ca: str | None = None
     ask: Positive = 5.0
-    heartbeat: Annotated[float, Meta(gt=0, le=30)] = 10.0
+    heartbeat: Positive = 10.0
 
 
 class Store(Struct, forbid_unknown_fields=True, frozen=True):
@@ -136,12 +137,13 @@ class Store(Struct, forbid_unknown_fields=True, frozen=True):
 
 
 class Configuration(Struct, frozen=True):
-    """Everything that the file says."""
+    """Everything that the file says. warnings: sentences about what is not kept as it says."""
 
     server: Server
     store: Store
     machines: tuple[Machine, ...]
     hold_all: bool = False
+    warnings: tuple[str, ...] = ()
 
 
 def read_configuration(path: Path) -> Configuration:
@@ -187,9 +189,16 @@ def configuration_from(content: dict[str, Any], folder: Path) -> Configuration:
     certificate = None if server.ca is None else str(folder / server.ca)
     if certificate is not None and (reason := _not_trusted(certificate)):
         raise ConfigurationError([f"server.ca: {certificate} {reason}"])
-    return Configuration(
-        msgspec.structs.replace(server, ca=certificate), placed, tuple(machines), bool(content.get("hold_all", False))
-    )
+    warnings = []
+    if server.heartbeat > LONGEST_HEARTBEAT:
+        longest = f"{LONGEST_HEARTBEAT:g}"
+        words = (
+            f"server.heartbeat = {server.heartbeat:g} is more than {longest}: one is sent every {longest} s, for the server takes a"
+            " bridge for silent after a minute. Set a smaller number, or none."
+        )
+        warnings.append(words)
+    server = msgspec.structs.replace(server, ca=certificate, heartbeat=min(server.heartbeat, LONGEST_HEARTBEAT))
+    return Configuration(server, placed, tuple(machines), bool(content.get("hold_all", False)), tuple(warnings))
 
 
 def _machine(key: str, table: dict[str, Any], folder: Path, problems: list[str]) -> Machine | None:

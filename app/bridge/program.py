@@ -35,6 +35,8 @@ def store_of(configuration: Configuration) -> Store:
 
 async def run(configuration: Configuration, store: Store) -> None:
     """Run all machines until cancelled."""
+    for words in configuration.warnings:
+        log.warning("%s", words)
     trusted = ssl.create_default_context(cafile=configuration.server.ca)  # one for all: each costs a megabyte
     async with contextlib.AsyncExitStack() as stack:
         wire = Wire(trusted)

@@ -1,5 +1,6 @@
 """The check of a configuration: what would go to the quarantine, and who does not answer."""
 
+import asyncio
 import os
 import socket
 import termios
@@ -7,12 +8,15 @@ from pathlib import Path
 
 import pytest
 
+from app.bridge import program
 from app.bridge.checking import check
 from app.bridge.configuration import configuration_from
 from app.bridge.kinds.dprnt import PrintedLink
 from app.bridge.store import Store
+from app.bridge.unit import ended
 from app.core.printed_line import Printed, line_of
 from app.core.ring import Slot, Unit
+from tests.bridge.plant import until
 from tests.forked import inband
 from tests.loops import run
 from tests.shop import Shop
@@ -47,6 +51,28 @@ def test_readings_for_the_quarantine_and_remarks_are_told(tmp_path: Path) -> Non
     )
     assert [each for each in said if each.startswith(wanted)]
     assert [each for each in said if each.startswith("✗ lathe-1: Missing readings: 3.")]
+
+
+def test_a_heartbeat_that_is_too_slow_is_sent_more_often_and_named(
+    tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    (tmp_path / "printed.txt").touch()
+    machines = {"machine": {"lathe-1": table("dprnt", file=str(tmp_path / "printed.txt"))}}
+    slow = configuration_from({"server": SERVER | {"heartbeat": 45}} | machines, tmp_path)
+    good = configuration_from({"server": SERVER | {"heartbeat": 30}} | machines, tmp_path)
+    assert (slow.server.heartbeat, good.server.heartbeat) == (30.0, 30.0)
+    words = "server.heartbeat = 45 is more than 30: one is sent every 30 s"
+    assert [words in str(each) for each in run(check(slow))][:2] == [True, False]
+    assert not any("server.heartbeat" in str(each) for each in run(check(good)))
+
+    async def work() -> None:
+        store = Store(tmp_path / "store.sqlite3")
+        running = asyncio.create_task(program.run(slow, store))
+        await until(lambda: words in caplog.text, "the log says so")
+        await ended([running])
+        store.close()
+
+    run(work())
 
 
 def test_a_characteristic_of_another_machine_is_told_as_that(shop: Shop, tmp_path: Path) -> None:

@@ -72,7 +72,7 @@ def test_a_good_one() -> None:
         ('kind = "tried"', 'kind = "tride"', "kind = 'tride' is not known; known are"),
         ('kind = "tried"', "", "machine.lathe-1.kind is missing"),
         ("port = 7", 'port = "7"', "machine.lathe-1.tried.port: Expected `int`, got `str`."),
-        ('example"\n', 'example"\nheartbeat = 31.0\n', "server.heartbeat: Expected `float` <= 30.0."),
+        ('example"\n', 'example"\nheartbeat = 0\n', "server.heartbeat: Expected `float` > 0.0."),
         ("port = 7", "prot = 7", "machine.lathe-1.tried.prot is not known: look for a typing error."),
         ('unit = "mm"', "", 'machine.lathe-1.unit is missing: "mm" or "inch", what'),
         (
