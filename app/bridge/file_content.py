@@ -416,10 +416,10 @@ class _Reader:
             except Unreadable as error:
                 self._fault(item.line, "K0004", f"{error}.", item.fields.get("K0004", ""))
                 return
-        told = item.fields
+        raw = item.fields
         if value.at is None and value.batch and not value.part:  # a batch is many parts: the next one may be as large
-            told = told | {"file": self.content.stamp}
-        self._add(item.line, f"{name}/{item.characteristic}", body, told, None, alone)
+            raw = raw | {"file": self.content.stamp}
+        self._add(item.line, f"{name}/{item.characteristic}", body, raw, None, alone)
 
     def _key_of(self, part: str, characteristic: aqdef.Characteristic) -> tuple[str | None, str]:
         """The key of a characteristic by part and number or name, number, or name; and its name for sentences."""
@@ -492,12 +492,12 @@ class _Reader:
             self.content.entries.append(Entry(line, name, body, alone))
             return
         if own is not None:
-            told = [own, name]
+            parts = [own, name]
         else:
-            told = [self.prefix[line], name, json.dumps(dict(raw), sort_keys=True, default=str)]
+            parts = [self.prefix[line], name, json.dumps(dict(raw), sort_keys=True, default=str)]
             if not body.keys() & {"measured_at", "machined_at", "part"}:
-                told.append(self.content.stamp)
-        digest = hashlib.sha256("\0".join(told).encode("utf-8", "replace")).hexdigest()[:32]
+                parts.append(self.content.stamp)
+        digest = hashlib.sha256("\0".join(parts).encode("utf-8", "replace")).hexdigest()[:32]
         place = "own" if own is not None else str(line)
         self.content.entries.append(Entry(line, name, body, f"{self.machine.key}:{place}:{digest}"))
 

@@ -131,10 +131,10 @@ def foreign_readings(
         content = object_in(payload)
     except WrongMessage as error:
         return [Found(None, None, {}, str(error))]
-    told = {field: value for field, path in fields.items() if (value := member(content, path)) is not None}
+    values = {field: value for field, path in fields.items() if (value := member(content, path)) is not None}
     if "measured" in fields:
         path = fields["measured"]
-        sizes = [(str(told.get("characteristic", EVERY)), told.pop("measured", None), _unit_beside(content, path))]
+        sizes = [(str(values.get("characteristic", EVERY)), values.pop("measured", None), _unit_beside(content, path))]
     else:
         sizes = [
             (name, size, _unit_beside(content, name))
@@ -143,19 +143,19 @@ def foreign_readings(
         ]
     if not sizes:
         return [Found(None, None, {}, "The message has none of the members that characteristics names.")]
-    return list(_mapped(payload, machine, told, sizes, characteristics, form, fields))
+    return list(_mapped(payload, machine, values, sizes, characteristics, form, fields))
 
 
 def _mapped(
     payload: bytes,
     machine: str,
-    told: Mapping[str, Any],
+    values: Mapping[str, Any],
     sizes: list[tuple[str, Any, Any]],
     characteristics: Mapping[str, str],
     form: Form,
     fields: Mapping[str, str],
 ) -> Iterator[Found]:
-    said, alone = told.get("key"), "measured" in fields
+    said, alone = values.get("key"), "measured" in fields
     for name, size, unit in sizes:
         if (key := characteristics.get(name)) is None:
             yield Found(None, None, {}, f"{name!r} is not named in machine.{machine}.characteristics. Add it there.")
@@ -163,8 +163,8 @@ def _mapped(
         body: dict[str, Any] = {"characteristic": key}
         wrong, left_out = "unit", dict[str, str]()
         try:
-            own = form.in_unit(unit_in(fields.get("measured", name)), told.get("unit", unit))
-            for field, value in {**told, "measured": size}.items():
+            own = form.in_unit(unit_in(fields.get("measured", name)), values.get("unit", unit))
+            for field, value in {**values, "measured": size}.items():
                 if field not in {"characteristic", "unit", "key"}:
                     wrong = f"{field} = {json.dumps(value, ensure_ascii=False)[:40]}"
                     if (read := own.value(field, "" if value is None else value)) is not None:
@@ -198,8 +198,8 @@ def _unit_beside(content: Any, path: str) -> Any:
     return None
 
 
-def _digest(told: bytes) -> str:
-    return hashlib.sha256(told).hexdigest()[:32]
+def _digest(content: bytes) -> str:
+    return hashlib.sha256(content).hexdigest()[:32]
 
 
 def member(content: Any, path: str) -> Any:

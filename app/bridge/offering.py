@@ -13,7 +13,7 @@ from datetime import UTC, datetime
 from app.bridge import proving_by_page
 from app.bridge.guards import Known, against
 from app.bridge.links import Order
-from app.bridge.store_tables import Intent
+from app.bridge.store_tables import REPORTED, Intent
 from app.bridge.unit import HeldBack, Unit
 from inband_client import AsyncClient, Conflict, Correction, Invalid, NotFound, ProblemError, TooLarge
 
@@ -33,14 +33,14 @@ async def tell(unit: Unit, client: AsyncClient) -> None:
         except REFUSED as error:
             refused = refused or error
         else:
-            await unit.store.set_intent(key, intent.order.number, "told")
-    for tool_memory, offset in (await unit.store.untold(key, NOTICED)).items():
+            await unit.store.set_intent(key, intent.order.number, REPORTED)
+    for tool_memory, offset in (await unit.store.unreported(key, NOTICED)).items():
         try:
             await client.report_offset(key, tool_memory, round(offset, 6), none_applied=True)
         except REFUSED as error:
             refused = refused or error
         else:
-            await unit.store.told(key, tool_memory, offset)
+            await unit.store.reported(key, tool_memory, offset)
     if refused is not None:
         raise refused
 
@@ -95,7 +95,7 @@ async def ask(unit: Unit, client: AsyncClient) -> None:
             unit.locations_at = (
                 -math.inf
             )  # it has another location now: no reading may name a correction of the one before
-    told = await store.intents(machine.key, "told") if pending else []
+    reported = await store.intents(machine.key, REPORTED) if pending else []
     known = await store.known(machine.key)
     await unit.look_if_held()
     orders: list[Order] = []
@@ -103,7 +103,7 @@ async def ask(unit: Unit, client: AsyncClient) -> None:
     for tool_memory, corrections in pending.items():
         if tool_memory in unheard:  # what these lead to is not known before the server has heard the answer
             continue
-        found = await _of_location(unit, client, corrections, told, known)
+        found = await _of_location(unit, client, corrections, reported, known)
         if isinstance(found, Order):
             orders.append(found)
         elif found is not None:
@@ -119,7 +119,7 @@ async def _of_location(
     unit: Unit,
     client: AsyncClient,
     corrections: Sequence[Correction],
-    told: Sequence[Intent],
+    reported: Sequence[Intent],
     known: Mapping[int, Known],
 ) -> Order | HeldBack | None:
     """The order that takes as many of these along as the guards let through, or why the first waits.
@@ -128,7 +128,7 @@ async def _of_location(
     """
     machine, first, now = unit.machine, corrections[0], datetime.now(UTC)
     for correction in corrections:
-        if earlier := _answered_before(told, correction):
+        if earlier := _answered_before(reported, correction):
             await _tell_again(unit, client, correction, earlier)
             return None
     if first.offset_expected is None:
@@ -185,9 +185,9 @@ def _note(unit: Unit, waiting: Sequence[HeldBack]) -> None:
     unit.held_back = tuple(waiting)
 
 
-def _answered_before(told: Sequence[Intent], correction: Correction) -> Intent | None:
+def _answered_before(reported: Sequence[Intent], correction: Correction) -> Intent | None:
     """The order with this correction whose answer the server has heard."""
-    for intent in told:
+    for intent in reported:
         order = intent.order
         if correction.number == order.number or (
             correction.number in order.merged and correction.tool_memory == order.tool_memory

@@ -38,22 +38,22 @@ def holds(test: Guided) -> str:
 # --- what the server says
 
 
-async def hear(unit: Unit, told: dict[str, Any] | None) -> None:
+async def hear(unit: Unit, asked: dict[str, Any] | None) -> None:
     """Take up the test that the server tells of, or say why not."""
-    if told is None or unit.test is not None or await offset_change.noted(unit.store, unit.machine.key) is not None:
+    if asked is None or unit.test is not None or await offset_change.noted(unit.store, unit.machine.key) is not None:
         return
-    test = Guided(told["id"], told["tool_memory"], told["amount"], time.monotonic() + LIMIT)
-    test.ending = await _against(unit, told)
+    test = Guided(asked["id"], asked["tool_memory"], asked["amount"], time.monotonic() + LIMIT)
+    test.ending = await _against(unit, asked)
     if test.ending is not None:
         test.end, test.reached = test.ending, test.ending[0]
     _open(unit, test)
 
 
-async def _against(unit: Unit, told: dict[str, Any]) -> tuple[str, str] | None:
-    machine, memory = unit.machine, told["tool_memory"]
-    if told["state"] == "read":
+async def _against(unit: Unit, asked: dict[str, Any]) -> tuple[str, str] | None:
+    machine, memory = unit.machine, asked["tool_memory"]
+    if asked["state"] == "read":
         return "cancelled", "The bridge was restarted during the touch test. Nothing was written."
-    if told["state"] != "asked":  # a note of it would be in the store from which it was written
+    if asked["state"] != "asked":  # a note of it would be in the store from which it was written
         return "failed", (
             "The bridge was restarted, and its store knows nothing of this touch test. Look whether the control shows the"
             " number of before; if not, set that by hand."
@@ -231,9 +231,9 @@ async def _talk(unit: Unit, client: AsyncClient) -> None:
         path = f"/machines/{unit.machine.key}/touch-tests/{test.number}"
         asked_at = time.monotonic()
         try:
-            if reached != test.told:
+            if reached != test.reported:
                 answer = await client.post(f"{path}/report", _report(test, reached), repeat=True)
-                test.told = reached
+                test.reported = reached
             else:
                 answer = await client.get(path)
         except (NotFound, Conflict, Invalid) as error:

@@ -111,7 +111,7 @@ def _concerns(decision: Decision) -> bool:
 
 async def _push_all(unit: Unit, client: AsyncClient, rows: Sequence[Waiting]) -> Sequence[Decision]:
     if len(rows) > 1:
-        bodies = [await _told(unit, client, row) for row in rows]
+        bodies = [await _as_sent(unit, client, row) for row in rows]
         try:
             batch = await client.push_many(bodies)
         except (*REFUSED, Forbidden):
@@ -126,7 +126,7 @@ async def _push_all(unit: Unit, client: AsyncClient, rows: Sequence[Waiting]) ->
 
 
 async def _push(unit: Unit, client: AsyncClient, row: Waiting) -> Decision | None:
-    body = await _told(unit, client, row)
+    body = await _as_sent(unit, client, row)
     try:
         decision = await client.push(body)
     except REFUSED as error:
@@ -163,7 +163,7 @@ async def _decided(unit: Unit, pairs: Sequence[tuple[Waiting, Decision]]) -> Non
     unit.decisions += decided
 
 
-async def _told(unit: Unit, client: AsyncClient, row: Waiting) -> dict[str, Any]:
+async def _as_sent(unit: Unit, client: AsyncClient, row: Waiting) -> dict[str, Any]:
     """A reading as the server takes it: with the correction in effect of its own tool location.
 
     A control keeps one number for all locations, which do not get their corrections in the order of the numbers.

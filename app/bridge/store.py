@@ -25,6 +25,7 @@ from app.bridge.store_lock import alone_with, in_words
 from app.bridge.store_tables import (
     ADD,
     LATER_COLUMNS,
+    REPORTED,
     SCHEMA,
     Added,
     Counts,
@@ -304,11 +305,11 @@ class Store:
         return await self._run(write)
 
     async def set_intent(self, machine: str, number: int, state: str) -> None:
-        """``told`` when the server has heard the answer, ``withdrawn`` when the control is no longer offered it."""
+        """`REPORTED` when the server has heard the answer, ``withdrawn`` when the control is no longer offered it."""
         await self._run(
             lambda database: database.execute(
                 "UPDATE intent SET state = ? WHERE machine = ? AND number = ? AND state = ?",
-                (state, machine, number, "answered" if state == "told" else "open"),
+                (state, machine, number, "answered" if state == REPORTED else "open"),
             )
         )
 
@@ -383,7 +384,7 @@ class Store:
             )
         )
 
-    async def untold(self, machine: str, least: float) -> dict[int, float]:
+    async def unreported(self, machine: str, least: float) -> dict[int, float]:
         """Offsets whose last reading differs by more than ``least`` from what the server knows, without those on which a
         correction is open.
         """
@@ -397,7 +398,7 @@ class Store:
         )
         return dict(rows)
 
-    async def told(self, machine: str, tool_memory: int, offset: float) -> None:
+    async def reported(self, machine: str, tool_memory: int, offset: float) -> None:
         """The server has heard which offset the control holds."""
         await self._run(
             lambda database: database.execute(

@@ -42,6 +42,9 @@ ADD: Final = (
     "INSERT INTO reading (machine, key, body, state, reason, at) VALUES (?, ?, ?, ?, ?, ?)"
     " ON CONFLICT (machine, key) DO NOTHING"
 )
+REPORTED: Final = "told"
+"""The state of an order whose answer the server has heard. Stores of installed bridges hold this word, as they call the offset of a
+location that the server knows."""
 MOST_REASON: Final = 500  # characters
 LATER_COLUMNS: Final = (
     ("intent", "merged", "TEXT"),

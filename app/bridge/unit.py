@@ -32,7 +32,7 @@ class Guided:
 
     number: at the server, None for one of the command that was cut off. heard: its state at the server; since: when it began at
     the latest, by the bridge's own clock, for a server may be unreachable and its clock may be set.
-    refused: the question that was answered with no. reached: the state that the bridge has brought it to; told: the one of these
+    refused: the question that was answered with no. reached: the state that the bridge has brought it to; reported: the one of these
     that the server knows. change: once it is read. changed: the control may hold its offset. waits: why that is not
     taken back yet, where the control itself answers. ending: the state and the words
     that it ends with as soon as the offset is taken back; end: these, when it is. until: when the bridge waits no longer for a
@@ -47,7 +47,7 @@ class Guided:
     since: float = 0.0
     refused: str | None = None
     reached: str = "asked"
-    told: str = "asked"
+    reported: str = "asked"
     change: Change | None = None
     changed: bool = False
     waits: str = ""

@@ -17,6 +17,7 @@ from app.bridge import offering, server_side
 from app.bridge.configuration import Server
 from app.bridge.links import Decided, Order, Outcome, Position, Received
 from app.bridge.store import Store
+from app.bridge.store_tables import REPORTED
 from app.bridge.unit import HeldBack, Unit, ended
 from app.loop.connections.schemas import HeartbeatIn
 from app.loop.tools.schemas import RejectionIn
@@ -126,12 +127,12 @@ def story(
     return run(work())
 
 
-def answered(outcome: Outcome, order: Order, *, told: bool) -> Callable[[Store], Any]:
+def answered(outcome: Outcome, order: Order, *, reported: bool) -> Callable[[Store], Any]:
     async def before(store: Store) -> None:
         await store.intend(M, order, "hash")
         await store.answered(M, outcome)
-        if told:
-            await store.set_intent(M, order.number, "told")
+        if reported:
+            await store.set_intent(M, order.number, REPORTED)
 
     return before
 
@@ -161,7 +162,7 @@ def test_what_is_no_longer_pending_is_withdrawn(tmp_path: Path) -> None:
 )
 def test_each_answer_is_told_once(tmp_path: Path, outcome: Outcome, heard: list[tuple[Any, ...]]) -> None:
     server = Scripted()
-    unit = story(tmp_path, server, answered(outcome, ORDER, told=False))
+    unit = story(tmp_path, server, answered(outcome, ORDER, reported=False))
     assert server.heard == heard
     run(offering.tell(unit, cast("AsyncClient", server)))
     assert server.heard == heard
@@ -170,7 +171,7 @@ def test_each_answer_is_told_once(tmp_path: Path, outcome: Outcome, heard: list[
 def test_a_correction_that_was_superseded_while_the_control_took_it_is_reported(tmp_path: Path) -> None:
     server = Scripted()
     server.confirming = Conflict("POST applied", "superseded", status=409, **said("conflict"))
-    story(tmp_path, server, answered(Outcome(18, applied=True, offset=-0.01), ORDER, told=False))
+    story(tmp_path, server, answered(Outcome(18, applied=True, offset=-0.01), ORDER, reported=False))
     assert server.heard == [("report", 3, -0.01)]
 
 
@@ -219,7 +220,7 @@ def test_a_report_that_is_refused_holds_up_no_other(tmp_path: Path) -> None:
     async def story() -> None:
         unit = unit_of(Model(), store_in(tmp_path))
         await unit.store.held(M, {2: 0.001, 3: 0.002})
-        await answered(Outcome(18, applied=False, reason="\x07"), ORDER, told=False)(unit.store)
+        await answered(Outcome(18, applied=False, reason="\x07"), ORDER, reported=False)(unit.store)
         with pytest.raises(NotFound, match="no such tool memory"):
             await offering.tell(unit, cast("AsyncClient", server))
 
@@ -230,7 +231,7 @@ def test_a_report_that_is_refused_holds_up_no_other(tmp_path: Path) -> None:
 def test_what_a_server_has_forgotten_is_confirmed_again(tmp_path: Path) -> None:
     """It went back in time: the correction waits again that the control has applied."""
     server = Scripted(correction(18))
-    unit = story(tmp_path, server, answered(Outcome(18, applied=True, offset=-0.01), ORDER, told=True))
+    unit = story(tmp_path, server, answered(Outcome(18, applied=True, offset=-0.01), ORDER, reported=True))
     assert server.heard == [("confirm", 18, -0.01)]
     assert unit.orders == ()
 
@@ -246,7 +247,7 @@ def test_a_number_that_the_control_has_answered_is_not_offered_again(
     tmp_path: Path, outcome: Outcome, after: float, words: str
 ) -> None:
     server = Scripted(correction(18, after))
-    unit = story(tmp_path, server, answered(outcome, ORDER, told=True))
+    unit = story(tmp_path, server, answered(outcome, ORDER, reported=True))
     [(what, number, reason)] = server.heard
     assert (what, number) == ("reject", 18)
     assert words in reason
@@ -307,14 +308,14 @@ def test_no_order_is_larger_than_the_limits(tmp_path: Path) -> None:
 def test_an_order_is_confirmed_for_each_correction_in_it(tmp_path: Path) -> None:
     server = Scripted()
     order = Order(22, 3, 0.0, -0.03, (18, 20))
-    unit = story(tmp_path, server, answered(Outcome(22, applied=True, offset=-0.03), order, told=False))
+    unit = story(tmp_path, server, answered(Outcome(22, applied=True, offset=-0.03), order, reported=False))
     assert server.heard == [("confirm", 18, None), ("confirm", 20, None), ("confirm", 22, -0.03)]
     server = Scripted(correction(18), correction(20, -0.02), correction(22, -0.03))  # went back in time
     run(offering.ask(unit, cast("AsyncClient", server)))
     assert server.heard == [("confirm", 18, None), ("confirm", 20, None), ("confirm", 22, -0.03)]
     assert unit.orders == ()
     refused = Scripted()
-    story(tmp_path / "refused", refused, answered(Outcome(22, applied=False, reason="no"), order, told=False))
+    story(tmp_path / "refused", refused, answered(Outcome(22, applied=False, reason="no"), order, reported=False))
     assert refused.heard == [("reject", 18, "no"), ("reject", 20, "no"), ("reject", 22, "no")]
 
 
@@ -330,9 +331,9 @@ def test_an_answer_that_comes_while_the_server_is_asked_takes_the_location_off(t
     server = Slow(correction(18), correction(19, -0.02), correction(20, tool=4))
     run(offering.ask(unit, cast("AsyncClient", server)))
     assert [order.number for order in unit.orders] == [20]
-    untold = answered(Outcome(18, applied=True, offset=-0.01), ORDER, told=False)
-    unit = unit_of(Model(), store_in(tmp_path / "untold"), location=PLACES)
-    run(untold(unit.store))
+    unreported = answered(Outcome(18, applied=True, offset=-0.01), ORDER, reported=False)
+    unit = unit_of(Model(), store_in(tmp_path / "unreported"), location=PLACES)
+    run(unreported(unit.store))
     run(offering.ask(unit, cast("AsyncClient", Scripted(*server.waiting))))
     assert [order.number for order in unit.orders] == [20], "the server has not heard of 18"
 
@@ -445,7 +446,7 @@ def test_what_a_proxy_answers_puts_no_reading_into_the_quarantine(tmp_path: Path
     server.confirming = NotFound("POST applied", "404 page not found", status=404)
 
     async def before(store: Store) -> None:
-        await answered(Outcome(18, applied=True, offset=-0.01), ORDER, told=False)(store)
+        await answered(Outcome(18, applied=True, offset=-0.01), ORDER, reported=False)(store)
         await store.add(M, [Received(f"k{n}", {"measured": 40.0}, Position(7, n)) for n in range(together)])
 
     unit = unit_of(Model(), store_in(tmp_path))

@@ -7,6 +7,7 @@ import sqlite3
 import subprocess
 import sys
 import time
+from contextlib import closing
 from dataclasses import replace
 from pathlib import Path
 
@@ -16,7 +17,7 @@ from app.bridge.links import Order, Outcome, Position, Received
 from app.bridge.slots import reading_of
 from app.bridge.store import Store
 from app.bridge.store_lock import StoreError
-from app.bridge.store_tables import Added
+from app.bridge.store_tables import REPORTED, Added
 from app.core.ring import Slot
 from app.simulators.controls.model import Model
 from tests.bridge.plant import machine
@@ -130,7 +131,7 @@ def test_an_answer_counts_once_and_makes_the_offset_known(store: Store) -> None:
         assert intent.outcome.applied
         assert (await store.known(M))[3].offset == 0.014
         assert not await store.intend(M, order, "abc")
-        await store.set_intent(M, 18, "told")
+        await store.set_intent(M, 18, REPORTED)
         assert not await store.intend(M, order, "abc")
         assert await store.intents(M, "open") == [], "what was answered is not offered again"
 
@@ -154,23 +155,56 @@ def test_a_correction_that_is_offered_again_is_what_it_is_now(store: Store, *, w
     run(story())
 
 
-def test_an_offset_is_told_once_and_not_while_a_correction_is_open(store: Store) -> None:
+def test_an_offset_is_reported_once_and_not_while_a_correction_is_open(store: Store) -> None:
     async def story() -> None:
         await store.held(M, {3: 0.02})
-        assert await store.untold(M, 0.0005) == {3: 0.02}
-        await store.told(M, 3, 0.02)
+        assert await store.unreported(M, 0.0005) == {3: 0.02}
+        await store.reported(M, 3, 0.02)
         await store.held(M, {3: 0.0203})
-        assert await store.untold(M, 0.0005) == {}
+        assert await store.unreported(M, 0.0005) == {}
         await store.intend(M, Order(1, 3, 0.02, 0.03), "abc")
         await store.held(M, {3: 0.03})
-        assert await store.untold(M, 0.0005) == {}
+        assert await store.unreported(M, 0.0005) == {}
         await store.answered(M, Outcome(1, True, 0.03))
-        await store.set_intent(M, 1, "told")
-        assert await store.untold(M, 0.0005) == {}
+        await store.set_intent(M, 1, REPORTED)
+        assert await store.unreported(M, 0.0005) == {}
         await store.held(M, {3: 0.05})
-        assert await store.untold(M, 0.0005) == {3: 0.05}
+        assert await store.unreported(M, 0.0005) == {3: 0.05}
 
     run(story())
+
+
+def test_a_store_of_an_installed_bridge_is_read_and_goes_on(tmp_path: Path) -> None:
+    """It holds which answers and offsets the server knows; forgotten, they would be reported again."""
+    file = tmp_path / "store.sqlite3"
+    with closing(sqlite3.connect(file)) as database:
+        database.executescript("""
+            CREATE TABLE intent (
+                machine TEXT NOT NULL, number INTEGER NOT NULL, tool_memory INTEGER NOT NULL, before REAL NOT NULL,
+                after REAL NOT NULL, mapping TEXT NOT NULL,
+                state TEXT NOT NULL CHECK (state IN ('open', 'answered', 'told', 'withdrawn')), applied INTEGER, held REAL,
+                differs INTEGER, reason TEXT, at REAL NOT NULL, PRIMARY KEY (machine, number));
+            CREATE TABLE location (
+                machine TEXT NOT NULL, tool_memory INTEGER NOT NULL, held REAL, told REAL, proved TEXT, proved_at REAL,
+                PRIMARY KEY (machine, tool_memory));
+            INSERT INTO intent VALUES ('lathe-1', 18, 3, 0, 0.01, 'abc', 'told', 1, 0.01, 0, '', 0);
+            INSERT INTO intent VALUES ('lathe-1', 19, 4, 0, 0.02, 'abc', 'answered', 1, 0.02, 0, '', 0);
+            INSERT INTO location VALUES ('lathe-1', 3, 0.01, 0.01, 'abc', 0);
+            INSERT INTO location VALUES ('lathe-1', 4, 0.02, 0.0, 'abc', 0);
+            """)
+    store = Store(file)
+
+    async def story() -> None:
+        assert not await store.intend(M, Order(18, 3, 0.0, 0.01), "abc")
+        assert [each.order.number for each in await store.intents(M, REPORTED)] == [18]
+        await store.set_intent(M, 19, REPORTED)
+        assert [each.order.number for each in await store.intents(M, REPORTED)] == [18, 19]
+        assert await store.unreported(M, 0.0005) == {4: 0.02}
+        await store.reported(M, 4, 0.02)
+        assert await store.unreported(M, 0.0005) == {}
+
+    run(story())
+    store.close()
 
 
 def test_one_call_that_fails_takes_no_other_along(store: Store) -> None:

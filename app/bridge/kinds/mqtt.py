@@ -128,7 +128,7 @@ class MqttLink:
         self._listening: asyncio.Task[None] | None = None
         self._readings: list[aiomqtt.Message] = []
         self._answers: list[aiomqtt.Message] = []
-        self._told: list[aiomqtt.Message] = []  # answers that were handed on
+        self._handed_on: list[aiomqtt.Message] = []  # answers, not acknowledged yet
         self._offsets: dict[int, float] = {}
         self._offered: tuple[Sequence[Order], float] | None = None
         self._taken_over = -OTHERS_TURN
@@ -189,7 +189,7 @@ class MqttLink:
             with contextlib.suppress(aiomqtt.MqttError, TimeoutError):
                 async with asyncio.timeout(GOODBYE):
                     await client.__aexit__(None, None, None)
-        self._readings, self._answers, self._told = [], [], []  # not acknowledged: they come again
+        self._readings, self._answers, self._handed_on = [], [], []  # not acknowledged: they come again
         self._offered = None
 
     async def _listen(self, client: aiomqtt.Client) -> None:
@@ -363,8 +363,8 @@ class MqttLink:
     async def offer(self, orders: Sequence[Order]) -> None:
         """Publish the pending list, retained, when it has changed, and before it expires."""
         self._there()
-        while self._told:
-            self._done(self._told.pop())
+        while self._handed_on:
+            self._done(self._handed_on.pop())
         if self.machine.corrections == "none":
             return
         now = time.monotonic()
@@ -373,11 +373,11 @@ class MqttLink:
             return
         expires = datetime.now(UTC) + timedelta(seconds=valid)
         # by number: a machine that takes them in this order ends with the highest one, and names it as that in effect
-        content = [self._told_as(order, expires) for order in sorted(orders, key=lambda order: order.number)]
+        content = [self._offer_of(order, expires) for order in sorted(orders, key=lambda order: order.number)]
         await self._publish("corrections", {"corrections": content}, retain=True, expires=valid if content else None)
         self._offered = (tuple(orders), now)
 
-    def _told_as(self, order: Order, expires: datetime) -> dict[str, object]:
+    def _offer_of(self, order: Order, expires: datetime) -> dict[str, object]:
         location = self._location(order.tool_memory)
         assert location is not None  # the guards have seen to it
         unit = self.machine.unit
@@ -400,7 +400,7 @@ class MqttLink:
         """The machine's answers since the last call."""
         self._there()
         messages, self._answers = self._answers, []
-        self._told += messages
+        self._handed_on += messages
         found = []
         for message in messages:
             try:

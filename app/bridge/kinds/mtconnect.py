@@ -275,7 +275,7 @@ class Context:
             self._choose(name, answer.observations)
         if self._items != known:
             self._ranks.clear()
-        self._ranks = self._told(answer.observations) | self._ranks
+        self._ranks = self._best_ranks(answer.observations) | self._ranks
         self.values.clear()
         self._executions.clear()
         self._take(answer, asked)
@@ -298,7 +298,7 @@ class Context:
             for subtype in SUBTYPES[name]:
                 fitting = {each.item for each in observations if (each.element, each.subtype) == (element, subtype)}
                 if len(fitting) > 1:
-                    if name in self._told(observations):
+                    if name in self._best_ranks(observations):
                         return
                     listed = ", ".join(sorted(fitting)[:5])
                     self.unclear.append(f"Several data items tell the {name} ({listed}): name one as context.{name}.")
@@ -306,7 +306,7 @@ class Context:
                 for item in fitting:
                     self._items[item] = name, len(self._items)
 
-    def _told(self, observations: Sequence[Observation]) -> dict[str, int]:
+    def _best_ranks(self, observations: Sequence[Observation]) -> dict[str, int]:
         """The rank of the best data item that has a value, of each that is reported."""
         found: dict[str, int] = {}
         for each in observations:

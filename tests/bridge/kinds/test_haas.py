@@ -215,7 +215,7 @@ def test_an_edit_by_hand_is_seen(tmp_path: Path) -> None:
             async with controlled(Unit(one, link(one), store)):
 
                 async def seen() -> bool:
-                    return (await store.untold("lathe-1", 0.0005)) == {3: pytest.approx(0.25)}
+                    return (await store.unreported("lathe-1", 0.0005)) == {3: pytest.approx(0.25)}
 
                 await until(seen, "the offset")
             store.close()
