@@ -177,6 +177,21 @@ class Link(Protocol):
         """The offsets that the control holds, by tool memory, mm; empty where they cannot be read."""
 
 
+class OneWay:
+    """The part of a link by which nothing goes back to the machine."""
+
+    async def offer(self, orders: Sequence[Order]) -> None:
+        """Nothing can be offered."""
+
+    async def outcomes(self) -> Sequence[Outcome]:
+        """Nothing is answered."""
+        return []
+
+    async def offsets(self) -> dict[int, float]:
+        """Nothing can be read."""
+        return {}
+
+
 class DecisionCarrier(Protocol):
     """A link that carries decisions to the control; without one the machine cannot be stopped by Inband."""
 

@@ -7,7 +7,7 @@ import os
 import socket
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Sequence
 from datetime import datetime
 from pathlib import Path
 from typing import Annotated, Any, Generic, Literal, Protocol, TypeVar
@@ -15,7 +15,8 @@ from typing import Annotated, Any, Generic, Literal, Protocol, TypeVar
 import msgspec
 from msgspec import Meta
 
-from app.bridge.links import ControlAway, Misconfigured
+from app.bridge.configuration import Machine
+from app.bridge.links import Clock, ControlAway, LinkError, Misconfigured, OneWay, Position, Received
 from app.bridge.moments import START
 
 HELD = 256 * 1024  # bytes that may wait for the next poll; then the sender has to
@@ -384,6 +385,50 @@ class Following(Source[L]):
         """Damaged lines since the last call."""
         number, self._lines.damaged = self._lines.damaged, 0
         return number
+
+
+class Printing(OneWay, Generic[L]):
+    """A link to a machine that prints: nothing can be acknowledged, and nothing goes back. remark: oddities, in words."""
+
+    def __init__(self, machine: Machine) -> None:
+        self.machine = machine
+        self.clock = Clock()
+        self.remark = ""
+        self._source: Source[L] | None = None
+        self._unstored: list[Received] = []
+        self._damaged = 0
+
+    async def close(self) -> None:
+        """Close the source."""
+        if self._source is not None:
+            with contextlib.suppress(OSError):
+                await self._source.close()
+            self._source = None
+
+    async def fetch(self, stored: Position) -> Sequence[Received]:
+        """The readings that have come, in their order; those that were not stored the last time come first."""
+        if self._source is None:
+            raise ControlAway("It is not open.")
+        try:
+            lines = await self._source.take()
+        except LinkError:
+            if not self._unstored:
+                raise
+            lines = []
+        self._unstored += self._received(self._source, lines, stored)
+        self._damaged += self._source.damaged()
+        self.remark = self._remark()
+        return list(self._unstored)
+
+    async def acknowledge(self, received: Sequence[Received]) -> None:
+        """They are stored. The machine cannot be informed."""
+        del self._unstored[: len(received)]
+
+    def _received(self, source: Source[L], lines: Sequence[L], stored: Position) -> Iterable[Received]:
+        raise NotImplementedError
+
+    def _remark(self) -> str:
+        raise NotImplementedError
 
 
 def _keep_alive(writer: asyncio.StreamWriter) -> None:

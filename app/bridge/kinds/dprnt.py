@@ -4,7 +4,6 @@ The control prints and asks nothing back, so nothing can be acknowledged, and no
 found by its number, and comes again with the second print at the end of the program. A reading is known by epoch and sequence.
 """
 
-import contextlib
 import time
 from collections import OrderedDict
 from collections.abc import Sequence
@@ -12,10 +11,10 @@ from datetime import datetime
 
 from app.bridge import sources
 from app.bridge.configuration import Machine
-from app.bridge.links import Clock, ControlAway, LinkError, Misconfigured, Order, Outcome, Position, Received
+from app.bridge.links import Misconfigured, Position, Received
 from app.bridge.moments import Prints
 from app.bridge.slots import printed_reading
-from app.bridge.sources import Following, Source, source_of
+from app.bridge.sources import Following, Printing, Source, source_of
 from app.core.printed_line import LineReader, Printed
 
 NUMBERED = True
@@ -33,21 +32,16 @@ class Settings(sources.Settings, forbid_unknown_fields=True, frozen=True):
     file: str | None = None
 
 
-class PrintedLink:
-    """A control that prints: a `Link` without acknowledgement and without corrections. remark: gaps and damage, in words."""
+class PrintedLink(Printing[Printed]):
+    """A control that prints. remark: gaps and damage, in words."""
 
     def __init__(self, machine: Machine) -> None:
-        self.machine = machine
-        self.clock = Clock()
-        self.remark = ""
+        super().__init__(machine)
         self._prints = Prints(self.clock, machine.interval)
-        self._source: Source[Printed] | None = None
-        self._unstored: list[Received] = []
         self._highest: tuple[int, int] | None = None
         self._missing: OrderedDict[tuple[int, int], None] = OrderedDict()
         self._recent: OrderedDict[tuple[int, int], float] = OrderedDict()
         self._lost = 0
-        self._damaged = 0
         self._epochs = ""
 
     async def connect(self) -> str:
@@ -64,33 +58,11 @@ class PrintedLink:
             self._missing.clear()
         return await self._source.open()
 
-    async def close(self) -> None:
-        """Close the source."""
-        if self._source is not None:
-            with contextlib.suppress(OSError):
-                await self._source.close()
-            self._source = None
-
-    async def fetch(self, stored: Position) -> Sequence[Received]:
-        """The readings that have come, in their order; those that were not stored the last time come first."""
-        if self._source is None:
-            raise ControlAway("It is not open.")
-        following = isinstance(self._source, Following)  # a file is read from its beginning, and counted from there
+    def _received(self, source: Source[Printed], lines: Sequence[Printed], stored: Position) -> list[Received]:
+        """The readings on these lines but for those that were printed before with the same size."""
+        following = isinstance(source, Following)  # a file is read from its beginning, and counted from there
         if not following and self._highest is None and stored.epoch is not None:
             self._highest = (stored.epoch, stored.sequence)
-        try:
-            lines = await self._source.take()
-        except LinkError:
-            if not self._unstored:
-                raise
-            lines = []
-        self._unstored += self._received(self._source, lines, stored.generation)
-        self._damaged += self._source.damaged()
-        self.remark = self._remark()
-        return list(self._unstored)
-
-    def _received(self, source: Source[Printed], lines: Sequence[Printed], generation: int) -> list[Received]:
-        """The readings on these lines but for those that were printed before with the same size."""
         new = []
         for printed in lines:
             slot, place = printed.slot, (printed.epoch, printed.slot.sequence)
@@ -103,7 +75,7 @@ class PrintedLink:
                 if len(self._recent) > REMEMBERED:
                     self._recent.popitem(last=False)
             epoch, sequence = self._highest or place
-            new.append((printed, Position(epoch, sequence, generation), known))
+            new.append((printed, Position(epoch, sequence, stored.generation), known))
         times = self._prints.place(
             [printed for printed, _, _ in new],
             datetime.now().astimezone(),
@@ -159,21 +131,6 @@ class PrintedLink:
         if self._damaged:
             words.append(f"Damaged lines since the start: {self._damaged}.")
         return " ".join(words)
-
-    async def acknowledge(self, received: Sequence[Received]) -> None:
-        """They are stored: they need not come again. The control cannot be informed."""
-        del self._unstored[: len(received)]
-
-    async def offer(self, orders: Sequence[Order]) -> None:
-        """Nothing can be offered."""
-
-    async def outcomes(self) -> Sequence[Outcome]:
-        """Nothing is answered."""
-        return []
-
-    async def offsets(self) -> dict[int, float]:
-        """Nothing can be read."""
-        return {}
 
 
 def link(machine: Machine) -> PrintedLink:

@@ -27,7 +27,7 @@ from app.bridge.configuration import Machine
 from app.bridge.fields import left_out_since
 from app.bridge.file_content import NAMES, NOT_ALONE, Content, Settings, read_content
 from app.bridge.file_rows import Fault, reasons
-from app.bridge.links import STOPPING, Clock, ControlAway, Decided, Misconfigured, Order, Outcome, Position, Received
+from app.bridge.links import STOPPING, Clock, ControlAway, Decided, Misconfigured, OneWay, Position, Received
 from app.bridge.moments import learn_ahead
 from app.bridge.plain_files import NotPlain, is_plain, read_plain, write_new
 
@@ -67,7 +67,7 @@ class _Known(NamedTuple):
     first: float
 
 
-class Folder:
+class Folder(OneWay):
     """The link to one folder."""
 
     def __init__(self, machine: Machine) -> None:
@@ -138,9 +138,6 @@ class Folder:
                 self._stored[name] = self._taken.pop(name)
         await self._in_thread(self._move_stored)
 
-    async def offer(self, orders: Sequence[Order]) -> None:
-        """Nothing goes back to a measuring machine."""
-
     @property
     def carries_decisions(self) -> bool:
         """A stop reaches those who look at the file."""
@@ -166,14 +163,6 @@ class Folder:
                 f"The decision {decided.action} cannot be written to {place}: {error.strerror or error}. May the bridge write"
                 " there?"
             ) from error
-
-    async def outcomes(self) -> Sequence[Outcome]:
-        """None."""
-        return []
-
-    async def offsets(self) -> dict[int, float]:
-        """None."""
-        return {}
 
     async def try_out(self) -> list[str]:
         """Make, move and delete a file as the bridge will do with those of the machine."""

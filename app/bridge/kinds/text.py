@@ -5,22 +5,21 @@ Nothing tells a line that was lost or damaged, and nothing comes again. A readin
 time or a part is known by its fields: printed again it is the same one. One without them is known by its arrival.
 """
 
-import contextlib
 import hashlib
 import json
 import re
 import time
 import uuid
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from datetime import datetime
 from typing import Any, Literal
 
 from app.bridge import sources
 from app.bridge.configuration import Machine
 from app.bridge.fields import EVERY, Form, left_out_since, put
-from app.bridge.links import Clock, ControlAway, LinkError, Misconfigured, Order, Outcome, Position, Received
+from app.bridge.links import Misconfigured, Position, Received
 from app.bridge.patterns import LONGEST_LINE, Patterns, TooSlow, check_expressions
-from app.bridge.sources import Source, source_of
+from app.bridge.sources import Printing, Source, source_of
 from app.core.ring import INCH
 from app.files.formats.cell_values import Unreadable, zone_named
 
@@ -87,20 +86,16 @@ class Line:
         self.text, self.patterns = text, patterns
 
 
-class TextLink:
-    """A machine that prints text: a `Link` without acknowledgement and without corrections. remark: what is odd, in words."""
+class TextLink(Printing[Line]):
+    """A machine that prints text. remark: lines without a reading or too long, temperatures that are left out."""
 
     def __init__(self, machine: Machine) -> None:
-        self.machine = machine
+        super().__init__(machine)
         self.settings: Settings = machine.settings
-        self.clock = Clock()
-        self.remark = ""
         zone = None if self.settings.zone is None else zone_named(self.settings.zone)
         scale = INCH if machine.unit == "inch" else 1.0
         self._form = Form(scale, self.settings.decimal, self.settings.times, zone)
-        self._source: Source[Line] | None = None
-        self._unstored: list[Received] = []
-        self._lines = self._found = self._damaged = 0
+        self._lines = self._found = 0
         self._left_out: dict[str, str] = {}
 
     async def connect(self) -> str:
@@ -112,39 +107,20 @@ class TextLink:
         self._source = source_of(self.settings, "text", lambda: TextLines(self.settings))
         return await self._source.open()
 
-    async def close(self) -> None:
-        """Close the source."""
-        if self._source is not None:
-            with contextlib.suppress(OSError):
-                await self._source.close()
-            self._source = None
-
-    async def fetch(self, stored: Position) -> Sequence[Received]:
-        """The readings that have come, in their order; those that were not stored the last time come first."""
-        del stored
-        if self._source is None:
-            raise ControlAway("It is not open.")
-        try:
-            lines = await self._source.take()
-        except LinkError:
-            if not self._unstored:
-                raise
-            lines = []
+    def _received(self, source: Source[Line], lines: Sequence[Line], stored: Position) -> Iterator[Received]:
+        del source, stored
         now = datetime.now().astimezone()
         for line in lines:
             self._lines += 1
             try:
                 found = line.patterns.find(line.text[:LONGEST_LINE])
             except TooSlow as error:
-                self._unstored.append(self._refused(line, str(error)))
+                yield self._refused(line, str(error))
                 continue
             self._found += len(found)
-            self._unstored += [each for fields in found if (each := self._received(line, fields, now))]
-        self._damaged += self._source.damaged()
-        self.remark = self._remark()
-        return list(self._unstored)
+            yield from [each for fields in found if (each := self._reading(line, fields, now))]
 
-    def _received(self, line: Line, fields: dict[str, str], now: datetime) -> Received | None:
+    def _reading(self, line: Line, fields: dict[str, str], now: datetime) -> Received | None:
         name = fields.get("characteristic", EVERY).strip()
         key = self.machine.characteristics.get(name)
         if key is None:
@@ -191,21 +167,6 @@ class TextLink:
         if self._damaged:
             words.append(f"Lines longer than {LONGEST_LINE} characters since the start: {self._damaged}. Baud rate?")
         return " ".join(words)
-
-    async def acknowledge(self, received: Sequence[Received]) -> None:
-        """They are stored. The machine cannot be informed."""
-        del self._unstored[: len(received)]
-
-    async def offer(self, orders: Sequence[Order]) -> None:
-        """Nothing can be offered."""
-
-    async def outcomes(self) -> Sequence[Outcome]:
-        """Nothing is answered."""
-        return []
-
-    async def offsets(self) -> dict[int, float]:
-        """Nothing can be read."""
-        return {}
 
 
 def _digest(parts: Sequence[str]) -> str:
