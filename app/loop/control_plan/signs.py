@@ -8,9 +8,9 @@ from bisect import bisect_right
 from collections.abc import Collection, Sequence
 from datetime import UTC, datetime
 from math import inf
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
-from sqlalchemy import and_, func, or_, select, true
+from sqlalchemy import Select, and_, func, or_, select, true
 from sqlalchemy.orm import Session
 
 from app.core.control_plan import Moment, Run, Tightened
@@ -85,15 +85,25 @@ def _newest_of_others(
     counts = and_(Reading.measured_at > moment, Reading.received_at > moment)
     first = Reading.sequence == Stream.sequence - most + 1
     made = Reading.code != Code.IMPORTED
-    query = (
-        select(
-            Reading.characteristic_id,
-            Reading.part,
-            func.least(Reading.measured_at, Reading.received_at),
-            first,
-            and_(counts, made),
-        )
-        .join(
+    columns = (Reading.characteristic_id, Reading.part, func.least(Reading.measured_at, Reading.received_at))
+    query = select(*columns, first, and_(counts, made)).where(
+        Characteristic.part.is_not_distinct_from(own.part),
+        Characteristic.id.in_(only) if only else true(),
+        or_(and_(counts, made), and_(first, or_(counts, Reading.code == Code.IMPORTED))),
+    )
+    found, more = [], set[int]()
+    for source, part, at, is_first, is_made in session.execute(_of_others(query, row, own, moment, most)):
+        if is_first:
+            more.add(source)
+        if is_made and (own.part is not None or part is not None):
+            found.append(Moment(at.timestamp(), source, part, shift_of(at.timestamp())))
+    return found, more
+
+
+def _of_others(query: Select[Any], row: ControlPlan, own: Characteristic, since: datetime, most: int) -> Select[Any]:
+    """A query of readings narrowed to the newest of each other characteristic of the machine that was measured since."""
+    return (
+        query.join(
             Stream,
             (Stream.machine_id == Reading.machine_id) & (Stream.characteristic_id == Reading.characteristic_id),
         )
@@ -106,21 +116,11 @@ def _newest_of_others(
             Stream.machine_id == row.machine_id,
             Characteristic.machine_id == row.machine_id,
             Characteristic.id != own.id,
-            Characteristic.part.is_not_distinct_from(own.part),
             Characteristic.form_of.is_distinct_from(own.id),
-            Characteristic.id.in_(only) if only else true(),
-            Stream.last_measured_at > moment,
+            Stream.last_measured_at > since,
             Reading.sequence > Stream.sequence - most,
-            or_(and_(counts, made), and_(first, or_(counts, Reading.code == Code.IMPORTED))),
         )
     )
-    found, more = [], set[int]()
-    for source, part, at, is_first, is_made in session.execute(query):
-        if is_first:
-            more.add(source)
-        if is_made and (own.part is not None or part is not None):
-            found.append(Moment(at.timestamp(), source, part, shift_of(at.timestamp())))
-    return found, more
 
 
 def runs(session: Session, row: ControlPlan, own: Characteristic, since: float) -> list[Run]:
@@ -131,33 +131,15 @@ def runs(session: Session, row: ControlPlan, own: Characteristic, since: float) 
     if row.minutes is None:
         return []
     moment = datetime.fromtimestamp(since, UTC)
-    another_part = (
-        select(
-            func.min(func.least(Reading.measured_at, Reading.received_at)),
-            func.bool_or(Reading.sequence == Stream.sequence - MOST + 1),
-        )
-        .join(
-            Stream,
-            (Stream.machine_id == Reading.machine_id) & (Stream.characteristic_id == Reading.characteristic_id),
-        )
-        .join(
-            Characteristic,
-            (Characteristic.machine_id == Stream.machine_id) & (Characteristic.id == Stream.characteristic_id),
-        )
-        .where(
-            Reading.machine_id == row.machine_id,
-            Stream.machine_id == row.machine_id,
-            Characteristic.machine_id == row.machine_id,
-            Characteristic.id != own.id,
-            or_(Characteristic.part.is_distinct_from(own.part), Characteristic.part.is_(None)),
-            Characteristic.form_of.is_distinct_from(own.id),
-            Stream.last_measured_at > moment,
-            Reading.sequence > Stream.sequence - MOST,
-            Reading.measured_at > moment,
-            Reading.received_at > moment,
-        )
+    another_part = select(
+        func.min(func.least(Reading.measured_at, Reading.received_at)),
+        func.bool_or(Reading.sequence == Stream.sequence - MOST + 1),
+    ).where(
+        or_(Characteristic.part.is_distinct_from(own.part), Characteristic.part.is_(None)),
+        Reading.measured_at > moment,
+        Reading.received_at > moment,
     )
-    first, more = session.execute(another_part).one()
+    first, more = session.execute(_of_others(another_part, row, own, moment, MOST)).one()
     if more:
         return []
     times = select(MachineRun.begin, MachineRun.until).where(
