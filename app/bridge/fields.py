@@ -6,7 +6,7 @@ from typing import Any, Final, NamedTuple
 from zoneinfo import ZoneInfo
 
 from app.files.formats import spreadsheet
-from app.files.formats.cell_values import Unreadable, number
+from app.files.formats.cell_values import Unreadable, number, zone_named
 from app.files.formats.file_times import LIVE, FileTimes
 from app.files.formats.units import LENGTHS, agreed, unit_behind
 
@@ -30,6 +30,17 @@ TEMPERATURES: Final = FIELDS[-2:]
 HIGHEST_NUMBER: Final = 2_147_483_647
 LONGEST_TEXT: Final = 128
 _CELSIUS: Final = ("°C", "ºC", "C")
+
+
+def refuse_unknown(zone: str | None, encoding: str | None = None) -> None:
+    """Raises `ValueError` for a time zone or an encoding that is not known."""
+    if zone is not None:
+        zone_named(zone)
+    if encoding is not None:
+        try:
+            "".encode(encoding)
+        except LookupError:
+            raise ValueError(f"encoding = {encoding!r} is not known; known are utf-8, cp1252, cp1250 …") from None
 
 
 class Form(NamedTuple):

@@ -19,7 +19,7 @@ from typing import Any, Final, Literal, NamedTuple
 from msgspec import Struct
 
 from app.bridge.configuration import Machine, Positive
-from app.bridge.fields import EVERY, FIELDS, TEMPERATURES, Form, put
+from app.bridge.fields import EVERY, FIELDS, TEMPERATURES, Form, put, refuse_unknown
 from app.bridge.file_rows import Fault, Found, Table, cell_of, csv_rows, has, ndjson_rows, reasons, units_of
 from app.bridge.links import Received
 from app.bridge.patterns import LONGEST_LINE, Patterns, TooSlow, check_expressions
@@ -91,15 +91,7 @@ class Settings(Struct, forbid_unknown_fields=True, frozen=True):
                 )
         for name in self.columns.keys() - set(FIELDS):
             raise ValueError(f"columns.{name} is no field; fields are {', '.join(FIELDS)}")
-        if self.zone is not None:
-            zone_named(self.zone)
-        if self.encoding is not None:
-            try:
-                "".encode(self.encoding)
-            except LookupError:
-                raise ValueError(
-                    f"encoding = {self.encoding!r} is not known; known are utf-8, cp1252, cp1250 …"
-                ) from None
+        refuse_unknown(self.zone, self.encoding)
         if self.delimiter is not None and len(self.delimiter) != 1 and self.delimiter != "blanks":
             raise ValueError("delimiter is one character, or blanks for two of them and more")
         if self.format == "text":

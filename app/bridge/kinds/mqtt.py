@@ -27,7 +27,7 @@ from paho.mqtt.packettypes import PacketTypes
 from paho.mqtt.properties import Properties
 
 from app.bridge.configuration import Location, Machine, Number, Positive
-from app.bridge.fields import FIELDS, Form, left_out_since
+from app.bridge.fields import FIELDS, Form, left_out_since, refuse_unknown
 from app.bridge.links import Clock, ControlAway, Decided, LinkError, Misconfigured, Order, Outcome, Position, Received
 from app.bridge.messages import foreign_readings, object_in, own_reading
 from app.bridge.moments import learn_ahead
@@ -87,8 +87,7 @@ class Settings(Struct, forbid_unknown_fields=True, frozen=True):
             raise ValueError("certificate and private_key belong together")
         for name in self.fields.keys() - set(FIELDS):
             raise ValueError(f"fields.{name} is no field; fields are {', '.join(FIELDS)}")
-        if self.zone is not None:
-            zone_named(self.zone)
+        refuse_unknown(self.zone)
         for word in (self.prefix, self.name or "", self.readings or ""):
             if set(word) & set("+#\0") or word.startswith("/"):
                 raise ValueError(f"{word!r} is no part of a topic: without + and #, not beginning with /")

@@ -16,7 +16,7 @@ from typing import Any, Literal
 
 from app.bridge import sources
 from app.bridge.configuration import Machine
-from app.bridge.fields import EVERY, Form, left_out_since, put
+from app.bridge.fields import EVERY, Form, left_out_since, put, refuse_unknown
 from app.bridge.links import Misconfigured, Position, Received
 from app.bridge.patterns import LONGEST_LINE, Patterns, TooSlow, check_expressions
 from app.bridge.sources import Printing, Source, source_of
@@ -45,13 +45,7 @@ class Settings(sources.Settings, forbid_unknown_fields=True, frozen=True):
     def __post_init__(self) -> None:
         """Refuse what contradicts itself."""
         check_expressions(self.lines)
-        if self.zone is not None:
-            zone_named(self.zone)
-        if self.encoding is not None:
-            try:
-                "".encode(self.encoding)
-            except LookupError:
-                raise ValueError(f"encoding = {self.encoding!r} is not known; known are utf-8, cp1252 …") from None
+        refuse_unknown(self.zone, self.encoding)
 
 
 class TextLines:
