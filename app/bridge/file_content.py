@@ -14,15 +14,26 @@ from contextlib import contextmanager
 from dataclasses import dataclass, field
 from math import isfinite
 from pathlib import Path
-from typing import Any, Final, Literal, NamedTuple
+from typing import Any, Final, NamedTuple
 
-from msgspec import Struct
-
-from app.bridge.configuration import Machine, Positive
-from app.bridge.fields import EVERY, FIELDS, TEMPERATURES, Form, put, refuse_unknown
-from app.bridge.file_rows import Fault, Found, Table, cell_of, csv_rows, has, ndjson_rows, reasons, units_of
+from app.bridge.configuration import Machine
+from app.bridge.fields import EVERY, FIELDS, TEMPERATURES, Form, put
+from app.bridge.file_rows import (
+    Fault,
+    Found,
+    Table,
+    cell_of,
+    csv_rows,
+    has,
+    labels_of,
+    ndjson_rows,
+    reasons,
+    unit_in_doubt,
+    units_of,
+)
+from app.bridge.file_settings import Settings
 from app.bridge.links import Received
-from app.bridge.patterns import LONGEST_LINE, Patterns, TooSlow, check_expressions
+from app.bridge.patterns import LONGEST_LINE, Patterns, TooSlow
 from app.core.ring import INCH
 from app.errors import TooManyRequests
 from app.files.apart import apart, spend
@@ -32,70 +43,12 @@ from app.files.formats.aqdef_keys import Keys
 from app.files.formats.aqdef_times import WallClock, day_order, time_of
 from app.files.formats.cell_values import Slashed, Unreadable, same_number, slashed, zone_named
 from app.files.formats.file_times import times_of
+from app.files.formats.headings import is_summary
 from app.files.formats.repeats import Repeats
-from app.files.formats.units import LENGTHS, UnknownUnit, beside, in_celsius, length_unit, unit_in
+from app.files.formats.units import LENGTHS, UnknownUnit, beside, in_celsius, length_unit, unit_in, unit_of_name
 
 NAMES: Final = {"csv": "*.csv", "xlsx": "*.xls[xm]", "ndjson": "*.ndjson", "text": "*.txt", "aqdef": "*.df[qdxQDX]"}
 NOT_ALONE: Final = 2  # files of a pair
-
-
-class Settings(Struct, forbid_unknown_fields=True, frozen=True):
-    """A folder into which a measuring machine writes files.
-
-    path: absolute. names: a pattern such as ``part_*.csv``; else by the format. done, failed: folders that files are moved to,
-    from ``path``, on the same disk or share. every: s between two looks; a file is read when two looks find it the same.
-    settle: s that a file whose last line has no end, or that cannot be read, has to stay the same. empty_after: s after
-    which an empty file, or one without its pair, has failed. largest: MB.
-
-    columns: column (or name in NDJSON) by field of `FIELDS`, two as ``Date+Time``; if empty, each is named as its field. Without ``measured`` the
-    names in ``characteristics`` are columns of sizes. lines: regular expressions with fields as named groups; one without
-    ``measured`` holds for the lines below. decimal, delimiter, encoding: of the text; the last two are found out if they are
-    left out. sheet: of a workbook; the first with cells if it is left out. times: the form of times, as strptime has it. zone: of times without an offset. day_first: in dates
-    with strokes, AQDEF only. missing: marks in place of a size that was not measured. others: readings of a characteristic that has no name in ``characteristics`` make the file fail,
-    or are passed over. decisions: an absolute path, of a file that says `stop` or `hold`; anyone who acts on it removes it.
-    """
-
-    path: str
-    format: Literal["csv", "xlsx", "ndjson", "text", "aqdef"]
-    names: str | None = None
-    done: str = "done"
-    failed: str = "failed"
-    every: Positive = 2.0
-    settle: Positive = 30.0
-    empty_after: Positive = 600.0
-    largest: Positive = 20.0
-    columns: dict[str, str] = {}
-    lines: tuple[str, ...] = ()
-    decimal: Literal[".", ","] = "."
-    delimiter: str | None = None
-    encoding: str | None = None
-    sheet: str | None = None
-    times: str | None = None
-    zone: str | None = None
-    day_first: bool | None = None
-    missing: tuple[str, ...] = ()
-    others: Literal["fail", "skip"] = "fail"
-    decisions: str | None = None
-
-    def __post_init__(self) -> None:
-        """Refuse what contradicts itself."""
-        if not Path(self.path).is_absolute():
-            raise ValueError(f"path = {self.path!r} is not absolute: name it from the root or the drive on")
-        if {Path(self.path, self.done), Path(self.path, self.failed)} & {Path(self.path)} or self.done == self.failed:
-            raise ValueError("done and failed are two other folders than path")
-        if self.decisions is not None:
-            place = Path(self.decisions)
-            if not place.is_absolute() or place.parent == Path(self.path):
-                raise ValueError(
-                    f"decisions = {self.decisions!r}: an absolute path of a file, in another folder than path"
-                )
-        for name in self.columns.keys() - set(FIELDS):
-            raise ValueError(f"columns.{name} is no field; fields are {', '.join(FIELDS)}")
-        refuse_unknown(self.zone, self.encoding)
-        if self.delimiter is not None and len(self.delimiter) != 1 and self.delimiter != "blanks":
-            raise ValueError("delimiter is one character, or blanks for two of them and more")
-        if self.format == "text":
-            check_expressions(self.lines)
 
 
 class Entry(NamedTuple):
@@ -266,6 +219,14 @@ class _Reader:
                 self._remark(row)
                 continue
             fields = {name: cell_of(row, column) for name, column in columns.items() if has(row, column)}
+            if label := next(filter(is_summary, labels_of(fields, row)), None):
+                self._fault(
+                    line,
+                    "",
+                    "holds limits or statistics, no part: let the program write readings alone.",
+                    str(label)[:40],
+                )
+                continue
             for name in fields.keys() & set(TEMPERATURES):
                 if not in_celsius(columns[name]):
                     del fields[name]
@@ -284,11 +245,7 @@ class _Reader:
             try:
                 units |= {column: unit(column) for column in sizes if column not in units}
             except UnknownUnit as error:
-                reason = (
-                    f"the header names the unit {error.word}, which is no length that is known ({', '.join(LENGTHS)}): "
-                    "name a unit that is, or none where the sizes are in the machine's."
-                )
-                self._fault(line, error.word, reason)
+                self._fault(line, error.word, unit_in_doubt(error.word))
                 return
             if "measured" in fields:
                 name = str(fields.get("characteristic", EVERY)).strip()
@@ -447,7 +404,7 @@ class _Reader:
             return
         body: dict[str, Any] = {"characteristic": key}
         try:
-            form = self.form.in_unit(unit, fields.get("unit"))
+            form = self.form.in_unit(unit, fields.get("unit"), unit_of_name(name))
         except Unreadable as error:
             hint = "" if fields.get("unit") is None else ' If this column holds no units, set columns.unit = "".'
             self._fault(line, self.settings.columns.get("unit", "unit"), f"{error}.{hint}")

@@ -10,7 +10,7 @@ from app.bridge.json_text import read_json
 from app.files.formats import aqdef, delimited
 from app.files.formats.headings import TOP, Heading, as_wide, heading, others
 from app.files.formats.repeats import Repeats
-from app.files.formats.units import is_unit_column, unit_above, unit_in
+from app.files.formats.units import LENGTHS, is_unit_column, unit_above, unit_in
 
 
 class Fault(NamedTuple):
@@ -98,9 +98,24 @@ def units_of(path: Path, table: Table) -> Callable[[str], str | None]:
     except (UnicodeError, delimited.Unusable):
         top = []  # said of the rows
     line, names, units, _end = _heading(top, table) if top else Heading(0, ())
-    above = unit_above(row.cells for row in top if row.line < line)
+    titles = [row.cells for row in top if row.line < line]
     below = dict(zip(names, units, strict=False))
-    return lambda column: unit_in(column) or below.get(column) or above
+    return lambda column: unit_in(column) or below.get(column) or unit_above(titles)
+
+
+def unit_in_doubt(word: str) -> str:
+    """The reason against sizes whose header, or a line above it, names a unit that cannot be taken."""
+    return (
+        f"the header, or a line above it, names the unit {word}: nobody can tell of which sizes, or it is no length that is known "
+        f"({', '.join(LENGTHS)}). Name the unit in the header of the column, or none where the sizes are in the machine's."
+    )
+
+
+def labels_of(fields: Mapping[str, Any], row: Mapping[str, Any]) -> list[Any]:
+    """The cells of a row that name its part, or would in any other row: the first one, and those of part and time."""
+    first = next((value for value in row.values() if value is not None and str(value).strip()), None)
+    sizes = (fields.get("measured"), fields.get("characteristic"))
+    return [fields.get("part"), fields.get("measured_at"), None if first in sizes else first]
 
 
 def parts_of(column: str, names: Collection[str]) -> list[str]:

@@ -25,8 +25,9 @@ from typing import Final, NamedTuple, TypeVar
 
 from app.bridge.configuration import Machine
 from app.bridge.fields import left_out_since
-from app.bridge.file_content import NAMES, NOT_ALONE, Content, Settings, read_content
+from app.bridge.file_content import NAMES, NOT_ALONE, Content, read_content
 from app.bridge.file_rows import Fault, reasons
+from app.bridge.file_settings import Settings
 from app.bridge.links import STOPPING, Clock, ControlAway, Decided, Misconfigured, OneWay, Position, Received
 from app.bridge.moments import learn_ahead
 from app.bridge.plain_files import NotPlain, is_plain, read_plain, write_new

@@ -10,6 +10,20 @@ LOWER_LIMITS = (
 )  # fmt: skip
 """Names of columns that hold a limit as a size; *upper* and *lower* by any other name are deviations from the nominal size."""
 
+SUMMARIES = frozenset({
+    "nominal", "nominal value", "nominal size", "target", "soll", "sollwert", "sollmass", "nennmass", "nazivna mera",
+    "номинал", "usl", "lsl", "ucl", "lcl", "ogw", "ugw", "oeg", "ueg", "upper limit", "lower limit", "upper spec",
+    "lower spec", "obere grenze", "untere grenze", "gornja granica", "donja granica", "zgornja meja", "spodnja meja",
+    "tol", "+tol", "tolerance", "upper tol", "lower tol", "upper tolerance", "lower tolerance", "upper deviation",
+    "lower deviation", "toleranz", "obere toleranz", "untere toleranz", "oberes abmass", "unteres abmass", "mean",
+    "average", "avg", "xbar", "x bar", "mittelwert", "mittel", "prosek", "srednja vrednost", "povprecje", "среднее",
+    "median", "min", "max", "minimum", "maximum", "мин", "макс", "range", "spannweite", "raspon", "размах", "std",
+    "stdev", "std dev", "std deviation", "sigma", "s", "sd", "standard deviation", "standardabweichung",
+    "standardna devijacija", "standardni odklon", "cp", "cpk", "pp", "ppk", "cm", "cmk", "count", "anzahl", "n", "sum",
+    "summe", "total", "gesamt", "suma", "vsota", "итого", "сумма", "ukupno", "skupaj",
+})  # fmt: skip
+"""First cells of rows that hold limits or statistics, and no part. Folded."""
+
 TEMPERATURES = ("part_temperature", "machine_temperature")
 """Columns that are circumstances of a reading, °C."""
 # Folded: lower case, no accents, no unit. The first of a line is the field's own name.

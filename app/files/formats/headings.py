@@ -5,6 +5,8 @@ from itertools import accumulate
 from typing import NamedTuple
 
 from app.files.formats import delimited
+from app.files.formats.cell_values import folded
+from app.files.formats.column_names import SUMMARIES
 from app.files.formats.delimited import Row
 from app.files.formats.units import is_unit_column, length_unit
 
@@ -96,6 +98,15 @@ def others(top: Sequence[Row], found: Heading, *, named: bool = False) -> Iterat
             beside = zip(found.names, row.cells, strict=False)
             measured += not named and sum(bool(name) and delimited.is_value(cell) for name, cell in beside) > 1
         yield row
+
+
+def is_summary(label: object) -> bool:
+    """Tell of the cell that names a row, or would: one of limits or statistics, which is no part.
+
+    >>> is_summary("Mean:"), is_summary("Std. Dev."), is_summary("P-17"), is_summary(None)
+    (True, True, False, False)
+    """
+    return label is not None and folded(str(label).rstrip(" :=")) in SUMMARIES
 
 
 def as_wide(row: Row, width: int) -> Row:

@@ -47,7 +47,15 @@ LONGEST_SIZE: Final = 400  # characters; what is longer is no size
 _LARGEST: Final = 1e300  # what is larger would become infinite
 _LAST_WORD: Final = re.compile(r"[_ ]([^_ ]+)$")
 _OTHER_SCALES: Final = {"f", "fahrenheit", "k", "kelvin", "r", "rankine", "℉"}
-_AT_END: Final = re.compile(r"[_ ](mm|MM|[uµμ]m|inch)$")
+_WORDS_OF: Final = re.compile(r"[^\W\d_]+")
+_UNMISTAKABLE: Final = frozenset(
+    ["mm", "µm", "inch", "inches", "zoll", "micron", "microns", "thou", "thous", "дюйм", "мм", "мкм"]
+)
+"""Words that mean a unit wherever they stand in a name. Others do at its end only: *um* is a German word, *in* an English one."""
+_AT_END: Final = re.compile(r"(?:[_,;/ ]|(?<=\d))(mm|MM|[uµμ]m|nm|cm|mils?|tenths?|[uµμ]in)$", re.IGNORECASE)
+_INCHES_AT_END: Final = re.compile(r"""(?:[_,;/] ?|(?<=\d) ?)(in\.?|"|'')$""", re.IGNORECASE)
+_AXES: Final = frozenset("xyzuvwijkrdlpt")
+"""Letters in square brackets that say which size it is: *CIR1 [X]*."""
 _NO_UNITS: Final = (
     {*"xyzabcuvwijkrdln", "id", "max", "min", "avg", "mean", "med", "std", "ist", "soll", "act", "nom", "dia", "abs", "rel"}
     | {"dev", "ok", "nok", "raw", "ref"}
@@ -89,20 +97,32 @@ def in_another_scale(header: Sequence[str], field: str, places: Sequence[int]) -
 
 
 class UnknownUnit(Exception):
-    """A header names a unit that is none of length, or not known. `word`: as it is written."""
+    """A name or a title names a unit that is none of length, not known, or maybe of something else. `word`: as it is written."""
 
     def __init__(self, word: str) -> None:
         super().__init__(word)
         self.word = word
 
 
-def unit_in(header: str) -> str | None:
-    """The unit that the name of a column carries, in brackets or as its last word. Raises `UnknownUnit`.
+@lru_cache(maxsize=4096)
+def unit_of_name(name: str) -> str | None:
+    """The unit that the name of a characteristic carries in its rows: *D1 [inch]*. Raises `Unreadable` for one that is not known."""
+    try:
+        return unit_in(name)
+    except UnknownUnit as error:
+        words = _("{name} names the unit {word}, which is no length that is known ({known})")
+        raise Unreadable(words.format(name=name[:40], word=repr(error.word), known=", ".join(LENGTHS))) from None
 
-    What is in square brackets is a unit, unless it holds a digit; in round ones if it is short and no usual word.
+
+def unit_in(header: str) -> str | None:
+    """The unit that the name of a column or a characteristic carries, in brackets or as a word. Raises `UnknownUnit`.
+
+    What is in square brackets is a unit, unless it holds a digit or is an axis; in round ones if it is short and no usual word.
 
     >>> unit_in("Wert [µm]"), unit_in("размер (мкм)"), unit_in("D40_mm"), unit_in("D (X)"), unit_in("measured")
     ('um', 'um', 'mm', None, None)
+    >>> unit_in("D40 inches"), unit_in("Bore_in"), unit_in("width, mil"), unit_in('D 1.5"'), unit_in("D1 [X]"), unit_in("Plug in")
+    ('inch', 'inch', 'mil', 'inch', None, None)
     >>> unit_in("Run-out [furlong]")
     Traceback (most recent call last):
         ...
@@ -113,11 +133,25 @@ def unit_in(header: str) -> str | None:
         word = (square or round_ or angle).strip()
         if unit := length_unit(word):
             return unit
-        if like_a_unit(word, least_doubt=bool(square)):
+        if like_a_unit(word, least_doubt=bool(square)) and not (square and word.lower() in _AXES):
             unknown = unknown or word
     if unknown is not None:
         raise UnknownUnit(unknown)
-    return length_unit(match[1]) if (match := _AT_END.search(header)) else None
+    header = header[:LONGEST_SIZE].strip()
+    if (match := _AT_END.search(header)) and (unit := length_unit(match[1])):
+        return unit
+    if _INCHES_AT_END.search(header):
+        return "inch"
+    named = _unmistakable(header)
+    if len(set(map(length_unit, named))) > 1:
+        raise UnknownUnit(", ".join(named))
+    return length_unit(named[0]) if named else None
+
+
+def _unmistakable(text: str) -> list[str]:
+    """The words of a text that mean a unit of length wherever they stand, as they are written."""
+    words = _WORDS_OF.findall(text.replace("\N{GREEK SMALL LETTER MU}", "\N{MICRO SIGN}"))
+    return [word for word in words if word.lower() in _UNMISTAKABLE and length_unit(word)]
 
 
 def unit_behind(text: str) -> tuple[str, str]:
@@ -180,8 +214,18 @@ def beside(row: Mapping[Any, Any], field: Literal["unit", "nominal"]) -> Any:
 
 
 _TITLE: Final = re.compile(
-    r"\b(?:units?|einheit(?:en)?|jedinica|enota|единица|јединица)\s*[=:]\s*([^\s;,]+)", re.IGNORECASE
+    r"\b(?:units?|einheit(?:en)?|jedinic[ae]|enot[ae]|единица|јединица)\s*[=:]\s*([^\s;,]+)", re.IGNORECASE
 )
+_SIZES_IN: Final = re.compile(
+    r"\b(?:all|dims?|dimensions?|sizes?|values?|measurements?|lengths?|results?|readings?|units?|ma(?:ß|ss)e?|werte?|messwerte?"
+    r"|angaben|längen|alle|mere|mera|vrednosti|dimenzije|rezultati|размеры|значения|мере|вредности)\b"
+    r"[^;|]{0,60}?(?:\b(?:in|are|sind|u|v|в|у|su|so)\b\s*|[:=]\s*)([^\s;,/]+)(?![^\s;,.)])",
+    re.IGNORECASE,
+)
+_ALONE: Final = re.compile(r"[\[(<]\s*([^\s\[\]()<>]{1,12})\s*[\])>]")
+_QUANTITY: Final = re.compile(r"\d\s*[^\W\d_]+")
+"""Such as the 2 µm of an uncertainty: that is no unit of the table."""
+_ABBREVIATED, _NAME_AND_VALUE = 2, 2
 
 
 def unit_above(titles: Iterable[Sequence[str]]) -> str | None:
@@ -189,15 +233,30 @@ def unit_above(titles: Iterable[Sequence[str]]) -> str | None:
 
     >>> unit_above([["DIM LOC1= CIRCLE CIR1  UNITS=IN"]]), unit_above([["Part", "4711"], ["Einheit:", "", "µm"]])
     ('inch', 'um')
+    >>> unit_above([["ALL DIMENSIONS IN INCHES"]]), unit_above([["Alle Maße in mm"]]), unit_above([["Report 3 (inch)"]])
+    ('inch', 'mm', 'inch')
+
+    Raises `UnknownUnit` where they name another unit than mm and do not say of what, or several: nobody can tell which counts.
+
+    >>> unit_above([["Tolerances in µm"]])
+    Traceback (most recent call last):
+        ...
+    app.files.formats.units.UnknownUnit: µm
     """
+    said, mentioned = dict[str, None](), list[str]()
     for cells in titles:
-        for at, cell in enumerate(cells):
-            match = _TITLE.search(cell)
-            named = is_unit_column(cell.strip().rstrip(":= "))
-            word = match[1] if match else next((each for each in cells[at + 1 :] if each.strip()), "") if named else ""
-            if unit := length_unit(word):
-                return unit
-    return None
+        filled = [cell.strip()[:LONGEST_SIZE] for cell in cells if cell.strip()]
+        for at, cell in enumerate(filled):
+            words = filled[at + 1 : at + 2] if is_unit_column(cell.rstrip(":= ")) else []
+            words += [*_TITLE.findall(cell), *_SIZES_IN.findall(cell)]
+            if len(filled) == 1:  # a title; in a row of several cells it may be of one column
+                words += [*_ALONE.findall(cell), cell if len(cell) > _ABBREVIATED else ""]
+            said |= {unit: None for word in words if (unit := length_unit(word.rstrip(".")))}
+            mentioned += _unmistakable(_QUANTITY.sub("", cell)) if len(filled) <= _NAME_AND_VALUE else []
+    several = list(said) if said else [word for word in mentioned if length_unit(word) != "mm"]
+    if len(several) > bool(said):
+        raise UnknownUnit(", ".join(dict.fromkeys(several)))
+    return next(iter(said), None)
 
 
 def in_mm(value: Any, unit: str | None) -> Any:

@@ -17,12 +17,12 @@ from app.files.formats import cell_values, delimited, spreadsheet
 from app.files.formats.cell_values import Unreadable, same_number
 from app.files.formats.column_names import TEMPERATURES
 from app.files.formats.delimited import Row, Unusable
-from app.files.formats.units import agreed, in_mm, unit_behind
+from app.files.formats.headings import is_summary
+from app.files.formats.units import agreed, in_mm, unit_behind, unit_of_name
 from app.language.i18n import _
+from app.loop.readings.importing.columns import DRAWN, ORIGIN
 from app.loop.readings.importing.layout import (
-    DRAWN,
     NO_DIGIT,
-    ORIGIN,
     Layout,
     Wishes,
     look,
@@ -174,6 +174,13 @@ def _csv(path: Path, layouts: Sequence[Layout]) -> Iterator[Item]:
                 passed = Passed(row.line, _("is the heading again"))
                 yield from (Item(place, row.line, passed) for place in range(len(layouts)))
                 continue
+            if label := next(filter(is_summary, _labels(row.cells, layouts[0])), None):
+                words = _(
+                    "holds limits or statistics, no part: name the first or the last line of readings (--first-line, --last-line)"
+                )
+                flaw = Flaw(row.line, "", shown(label), words)
+                yield from (Item(place, row.line, flaw) for place in range(len(layouts)))
+                continue
             if (stranger := _stranger(row.line, row.cells, layouts)) is not None:
                 yield Item(0, row.line, stranger)
                 continue
@@ -187,6 +194,14 @@ def _csv(path: Path, layouts: Sequence[Layout]) -> Iterator[Item]:
     except Unusable as error:
         line = error.line or 0
         yield from (Item(place, line, Flaw(line, "", "", str(error))) for place in range(len(layouts)))
+
+
+def _labels(cells: Sequence[str], layout: Layout) -> list[str]:
+    """The cells of a row that name its part, or would in any other row: the first one, and those of part and time."""
+    sizes = {place for name in ("measured", "characteristic") for place in layout.columns.get(name, ())}
+    first = next((place for place, cell in enumerate(cells) if cell.strip()), 0)
+    places = {first, *layout.columns.get("part", ()), *layout.columns.get("measured_at", ())} - sizes
+    return [cells[place].strip() for place in places]
 
 
 def _stranger(line: int, cells: Sequence[Any], layouts: Sequence[Layout]) -> Passed | None:
@@ -239,14 +254,19 @@ def _of_row(row: Row, layout: Layout, readers: Sequence["_Reader"]) -> Iterator[
             flawed = True
             yield Flaw(row.line, layout.named(name), shown(text), str(error))
     if not flawed:
-        yield _in_mm(values, layout, row.line, behind)
+        yield _in_mm(values, layout, row.line, behind, named_in(row.cells, layout))
 
 
-def _in_mm(values: dict[str, Any], layout: Layout, line: int, behind: str = "") -> "dict[str, Any] | Flaw":
-    """The fields of a reading with its sizes in mm, and with its origin. behind: the unit behind the size in its cell."""
+def _in_mm(
+    values: dict[str, Any], layout: Layout, line: int, behind: str = "", name: str = ""
+) -> "dict[str, Any] | Flaw":
+    """The fields of a reading with its sizes in mm, and with its origin. behind: the unit behind the size in its cell.
+
+    name: of the characteristic, in a row that says of which one it is.
+    """
     said = values.pop("unit", None)
     try:
-        unit = agreed(layout.said_unit, said, behind)
+        unit = agreed(layout.said_unit, said, behind, unit_of_name(name))
     except Unreadable as error:
         column = layout.named("unit") if said else layout.named("measured")
         reason = str(error)
@@ -369,7 +389,7 @@ def _of_object(number: int, value: Any, layout: Layout) -> Iterator["dict[str, A
     flaws = list(_converted(values, layout, number))
     yield from flaws
     if not flaws:
-        yield _in_mm(values, layout, number)
+        yield _in_mm(values, layout, number, name=named_in([value.get(each) for each in layout.header], layout))
 
 
 def objects(path: Path, kind: str) -> Iterator[tuple[int, Any]]:

@@ -6,10 +6,11 @@ from app.core.natural import NaturalLimit
 from app.core.number_text import NotANumber, read_number
 from app.files.formats.cell_values import Unreadable, folded
 from app.files.formats.column_names import LOWER_LIMITS, UPPER_LIMITS
-from app.files.formats.units import UnknownUnit, agreed, in_mm, unit_in
+from app.files.formats.units import UnknownUnit, agreed, in_mm, unit_in, unit_of_name
 from app.language.i18n import _
 from app.loop.readings.importing.aqdef.matching import Content, not_new
-from app.loop.readings.importing.layout import Drawn, Layout, is_unsigned
+from app.loop.readings.importing.columns import is_unsigned
+from app.loop.readings.importing.layout import Drawn, Layout
 
 _SIZES = frozenset(map(folded, (*UPPER_LIMITS, *LOWER_LIMITS)))
 
@@ -31,7 +32,7 @@ def missing(layout: Layout, chosen: Collection[int]) -> tuple[list[Content], lis
 
 def _content(place: int, name: str, drawn: Drawn, layout: Layout) -> Content:
     try:
-        nominal, lower, upper = _limits(drawn, layout)
+        nominal, lower, upper = _limits(name, drawn, layout)
         natural = _natural(drawn, layout)
     except _Wrong as error:
         return Content(place, "", "", "", name, "mm", not_new=str(error))
@@ -52,13 +53,12 @@ def _natural(drawn: Drawn, layout: Layout) -> NaturalLimit | None:
     return NaturalLimit(said)
 
 
-def _limits(drawn: Drawn, layout: Layout) -> tuple[float | None, float | None, float | None]:
+def _limits(name: str, drawn: Drawn, layout: Layout) -> tuple[float | None, float | None, float | None]:
     """Nominal size, lower and upper limit, mm. Raises `_Wrong`."""
     if drawn.other:
         words = _("lines {first} and {other} give it different limits, nominal sizes or units")
         raise _Wrong(words.format(first=drawn.line, other=drawn.other))
-    nominal = _length(drawn, layout, "nominal")
-    lower, upper = (_length(drawn, layout, side) for side in ("lower", "upper"))
+    nominal, lower, upper = (_length(name, drawn, layout, side) for side in ("nominal", "lower", "upper"))
     if is_unsigned(layout.named("lower")) and lower is not None:
         lower = -abs(lower)
     sizes = []
@@ -78,12 +78,12 @@ def _limits(drawn: Drawn, layout: Layout) -> tuple[float | None, float | None, f
     return nominal, sizes[0], sizes[1]
 
 
-def _length(drawn: Drawn, layout: Layout, field: str) -> float | None:
+def _length(name: str, drawn: Drawn, layout: Layout, field: str) -> float | None:
     text = getattr(drawn, field)
     if not text:
         return None
     try:
-        unit = agreed(unit_in(layout.named(field)) or layout.said_unit, drawn.unit)
+        unit = agreed(unit_in(layout.named(field)) or layout.said_unit, drawn.unit, unit_of_name(name))
         length: float = in_mm(read_number(text), unit)
     except (NotANumber, Unreadable, UnknownUnit) as error:
         reason = str(error) if isinstance(error, Unreadable) else _("is not a number, or in no unit that is known")

@@ -12,26 +12,18 @@ from zoneinfo import ZoneInfo
 from app.errors import FieldError, Invalid
 from app.files.formats import cell_values, delimited, parts_across, spreadsheet
 from app.files.formats.cell_values import slashed
-from app.files.formats.column_names import NAMES
 from app.files.formats.delimited import Row, Unusable
 from app.files.formats.file_times import FileTimes, times_of
 from app.files.formats.headings import TOP, as_wide, heading, others
-from app.files.formats.units import LENGTHS, UnknownUnit, in_another_scale, unit_above, unit_behind, unit_in
+from app.files.formats.units import LENGTHS, UnknownUnit, unit_above, unit_behind, unit_in
 from app.language.i18n import _
-from app.loop.readings.origin import COLUMNS
+from app.loop.readings.importing.columns import DRAWN, columns_of, fits, guesses_of, nominal_of
 
 MOST_COLUMNS = 500
 LONGEST_NAME = 1_000
 """Characters of a column's name, or a characteristic's: the page shows each a dozen times, and a cell may have 131,072."""
-ORIGIN = COLUMNS[:2]
-"""Fields that are no choice of a person: they are there in what Inband wrote."""
 NO_DIGIT = "*"
-DRAWN = ("nominal", "upper", "lower", "natural_limit")
-"""Fields of a characteristic, not of its readings: they set it up where it is missing."""
 MOST_NAMES = 1_000
-DATES = {"date", "datum", "дата", "датум"}
-AXES = {"axis", "ax", "achse", "osa", "os", "оса", "ось"}
-TIMES = {"time", "zeit", "uhrzeit", "vreme", "cas", "время", "време"}
 
 
 @dataclass(frozen=True)
@@ -77,6 +69,7 @@ class Layout:
     units: tuple[
         str | None, ...
     ] = ()  # of columns whose header says none: in a row below it, or in the lines above the table
+    doubt: str = ""  # a unit that the lines above the table name, and do not say of what
     nominal: tuple[int, ...] = ()  # of the nominal size, which is one for all rows of a characteristic
     zone: ZoneInfo | None = None
     time_format: str | None = None
@@ -121,6 +114,13 @@ class Layout:
     def subjects(self) -> tuple[str, ...]:
         """Names that characteristics may be chosen for: those in the rows, else those of the columns."""
         return self.names or self.header
+
+    def refuse_doubt(self) -> None:
+        """Refuse to take sizes whose unit nobody can tell for millimetres. Raises `Invalid`."""
+        if self.doubt:
+            words = _("The lines above the table name the unit {unit}, and nobody can tell of which numbers.")
+            what = _("Say in which unit the numbers of the table are: {units}.").format(units=", ".join(LENGTHS))
+            raise wrong("unit", f"{words.format(unit=self.doubt)} {what}")
 
     def of_one(self, key: str, name: str) -> "Layout":
         """The layout for one characteristic: of a table with rows of several, its own rows. Raises `Invalid`."""
@@ -252,21 +252,21 @@ def _csv_layout(path: Path, wishes: Wishes, zone: ZoneInfo | None, kind: str = "
     if found is None:
         words = _("Line {n} is empty, or too far below to be the header of the columns.")
         raise wrong("header_line", words.format(n=wishes.header_line))
-    if wishes.header_line is None and not _fits(found.names, wishes.mapping):
+    if wishes.header_line is None and not fits(found.names, wishes.mapping):
         by_name = any(column and not column.isdigit() for column in wishes.mapping.values())
         near = (row for row in others(top, found, named=by_name) if not any(map(delimited.is_value, row.cells)))
-        fitting = (row.line for row in near if _fits([cell.strip() for cell in row.cells], wishes.mapping))
+        fitting = (row.line for row in near if fits([cell.strip() for cell in row.cells], wishes.mapping))
         found = heading(top, next(fitting, None), ragged=kind == "sheet") or found
     head, header, units, end = found
     _refuse_wide(header)
     first_line = max(head + 1, end + 1, wishes.first_line or 0)
-    columns = _columns(header, wishes.mapping)
+    columns = columns_of(header, wishes.mapping)
     place = columns.get("measured", (0,))[0]
     # Where no column is the measured one, it may be any of them, or several.
     only = slice(place, place + 1) if "measured" in columns else slice(None)
     below = [row for row in chain(top, islice(rows, 200)) if row.line >= first_line]
     sample = [unit_behind(cell)[0] for row in below for cell in row.cells[only]]
-    above = unit_above(row.cells for row in top if row.line < head)
+    above, doubt = _above([row.cells for row in top if row.line < head])
     units = tuple(unit or above for unit in units or (None,) * len(header))
     made = Layout(
         kind=kind,
@@ -277,19 +277,30 @@ def _csv_layout(path: Path, wishes: Wishes, zone: ZoneInfo | None, kind: str = "
         decimal=wishes.decimal or delimited.decimal_of(sample),
         said_unit=(unit_of(header[place], wishes.unit) or units[place]) if "measured" in columns else wishes.unit,
         units=units,
-        nominal=_nominal(header, columns, wishes.mapping),
+        doubt="" if wishes.unit or "unit" in columns else doubt,
+        nominal=nominal_of(header, columns, wishes.mapping),
         zone=zone,
         time_format=wishes.time_format,
         header_line=head,
         first_line=first_line,
         last_line=wishes.last_line,
         missing=wishes.missing,
-        parts=() if "measured" in columns else parts_across.columns(header, _guesses(header), below),
+        parts=() if "measured" in columns else parts_across.columns(header, guesses_of(header), below),
     )
+    if "measured" in columns and made.said_unit is None:
+        made.refuse_doubt()
     named = (
         (row.line, row.cells) for row in rows_of(path, made) if isinstance(row, Row) and tuple(row.cells) != header
     )
     return replace(_timed(made, _times(made, below, rows)), drawn=_drawn(made, named))
+
+
+def _above(titles: Sequence[Sequence[str]]) -> tuple[str | None, str]:
+    """The unit that the lines above a table say for all of it; or the one that they name without saying of what."""
+    try:
+        return unit_above(titles), ""
+    except UnknownUnit as error:
+        return None, error.word
 
 
 def _timed(layout: Layout, times: FileTimes) -> Layout:
@@ -342,8 +353,8 @@ def _drawn(layout: Layout, rows: Iterable[tuple[int, Sequence[Any]]]) -> dict[st
 
 
 def named_in(cells: Sequence[Any], layout: Layout) -> str:
-    """The characteristic that a row names."""
-    return " ".join(written(cells[place]) for place in layout.columns["characteristic"])
+    """The characteristic that a row names; empty in a table whose rows name none."""
+    return " ".join(written(cells[place]) for place in layout.columns.get("characteristic", ()))
 
 
 def written(cell: Any) -> str:
@@ -372,14 +383,14 @@ def _json_layout(path: Path, wishes: Wishes, zone: ZoneInfo | None, *, is_list: 
     header = tuple(names)
     if not header:
         raise wrong("file", _("The file holds no JSON objects."))
-    columns = _columns(header, wishes.mapping)
+    columns = columns_of(header, wishes.mapping)
     unit = unit_of(header[columns["measured"][0]] if "measured" in columns else "", wishes.unit)
     layout = Layout(
         "list" if is_list else "lines",
         header,
         columns,
         said_unit=unit,
-        nominal=_nominal(header, columns, wishes.mapping),
+        nominal=nominal_of(header, columns, wishes.mapping),
         zone=zone,
         time_format=wishes.time_format,
     )
@@ -420,99 +431,3 @@ def _object(line: str) -> Any:
         return json.loads(line)
     except ValueError:
         return None  # the line is named when it is read
-
-
-def _columns(header: tuple[str, ...], mapping: Mapping[str, str]) -> dict[str, tuple[int, ...]]:
-    problems: list[FieldError] = []
-    columns: dict[str, tuple[int, ...]] = {}
-    for name, column in mapping.items():
-        if name not in NAMES:
-            message = _("There is no field {name}; there are {names}.").format(name=repr(name), names=", ".join(NAMES))
-            problems.append(FieldError("map", message))
-        elif column:  # an empty one says: not in this file
-            places = _places(header, column)
-            if places is None:
-                message = _("There is no column {column}; the file has: {header}.")
-                message = message.format(column=repr(column), header=", ".join(header))
-                problems.append(FieldError(f"map {name}", message))
-            elif in_another_scale(header, name, places):
-                message = _("The column {column} names another scale; temperatures are in °C.").format(
-                    column=repr(column)
-                )
-                problems.append(FieldError(f"map {name}", message))
-            else:
-                columns[name] = places
-    if problems:
-        raise Invalid(problems[0].message, _("Nothing was imported."), errors=problems)
-    used_places = {place for places in columns.values() for place in places}
-    guesses = [guess for guess in _guesses(header).items() if not in_another_scale(header, *guess)]
-    columns |= {name: guess for name, guess in guesses if name not in mapping and not used_places & set(guess)}
-    if "characteristic" in columns:
-        return columns
-    return {name: places for name, places in columns.items() if name not in DRAWN}
-
-
-def _fits(names: Sequence[str], mapping: Mapping[str, str]) -> bool:
-    """Tell of names that have the columns which a person names, and one that is measured."""
-    columns = [column for column in mapping.values() if column and not column.isdigit()]
-    named = all(column in names or all(part.strip() in names for part in column.split("+")) for column in columns)
-    return named and ("measured" in mapping or "measured" in _guesses(tuple(names)))
-
-
-def _nominal(
-    header: tuple[str, ...], columns: Mapping[str, tuple[int, ...]], mapping: Mapping[str, str]
-) -> tuple[int, ...]:
-    """The column of nominal sizes, also where they set nothing up; none where a person says so."""
-    if "nominal" in columns or "nominal" in mapping or "measured" not in columns:
-        return columns.get("nominal", ())
-    guess = _guesses(header).get("nominal", ())
-    return () if set(guess) & {place for places in columns.values() for place in places} else guess
-
-
-def _places(header: tuple[str, ...], column: str) -> tuple[int, ...] | None:
-    """Return the place of a column: by its name or number, or two that belong together as Date+Time or 2+3."""
-    place = _place(header, column)
-    if place is not None:
-        return (place,)
-    places = [_place(header, part.strip()) for part in column.split("+")]
-    named_places = tuple(place for place in places if place is not None)
-    return named_places if len(named_places) == len(places) else None
-
-
-def _place(header: tuple[str, ...], column: str) -> int | None:
-    if column in header:
-        return header.index(column)
-    if column.isascii() and column.isdigit() and len(column) < 6 and 1 <= int(column) <= len(header):
-        return int(column) - 1
-    return None
-
-
-def is_unsigned(column: str) -> bool:
-    """Tell of a column of lower deviations without a sign, which its name has: -TOL."""
-    return column.strip().lower().replace(" ", "") in {"-tol", "tol-", "-tolerance"}
-
-
-def _guesses(header: tuple[str, ...]) -> dict[str, tuple[int, ...]]:
-    names = [cell_values.folded(name) for name in header]
-    guesses: dict[str, tuple[int, ...]] = {}
-    for name, words in NAMES.items():
-        folded = [cell_values.folded(word) for word in words]
-        ranked = sorted((folded.index(each), place) for place, each in enumerate(names) if each in folded)
-        if ranked:
-            guesses[name] = (ranked[0][1],)
-    date = next((place for place, each in enumerate(names) if each in DATES), None)
-    time = next((place for place, each in enumerate(names) if each in TIMES), None)
-    if date is not None and time is not None:
-        guesses["measured_at"] = (date, time)
-    unsigned = [at for at, name in enumerate(header) if is_unsigned(name)]
-    if "lower" not in guesses and unsigned:
-        guesses["lower"] = (unsigned[0],)
-    beside = next((at for at, each in enumerate(names) if each in AXES), None)
-    if "characteristic" in guesses and beside is not None:
-        guesses["characteristic"] += (beside,)  # a feature has several: X, Y, D
-    elif "characteristic" not in guesses and "measured" in guesses and "nominal" in guesses:
-        named = names.index("id") if "id" in names else beside
-        guesses |= {} if named is None else {"characteristic": (named,)}
-    if set(COLUMNS) <= set(header):
-        guesses |= {name: (header.index(name),) for name in ORIGIN}
-    return guesses

@@ -23,8 +23,9 @@ from app.loop.readings.importing.actions import import_readings
 from app.loop.readings.importing.aqdef import form as aqdef_form
 from app.loop.readings.importing.aqdef.actions import machine_for
 from app.loop.readings.importing.aqdef.matching import NEW, Content
+from app.loop.readings.importing.columns import DRAWN
 from app.loop.readings.importing.history import Flawed
-from app.loop.readings.importing.layout import DRAWN, NO_DIGIT, Layout, Wishes, refuse_incomplete
+from app.loop.readings.importing.layout import NO_DIGIT, Layout, Wishes, refuse_incomplete
 from app.loop.readings.importing.lines import look_apart, read_apart
 from app.loop.readings.importing.preview import TRIED_WHOLE, Preview, PreviewLine, first_lines, preview
 from app.loop.readings.importing.uploads import Upload

@@ -19,8 +19,9 @@ from app.loop.readings.importing import drawn
 from app.loop.readings.importing.aqdef.actions import machine_for, set_up
 from app.loop.readings.importing.aqdef.matching import NEW, Content
 from app.loop.readings.importing.cells import MOST_FLAWS, Flaw
+from app.loop.readings.importing.columns import ORIGIN
 from app.loop.readings.importing.history import Flawed, Progress, Summary, store_history
-from app.loop.readings.importing.layout import ORIGIN, Layout, unit_of
+from app.loop.readings.importing.layout import Layout, unit_of
 from app.loop.readings.importing.lines import Read, lines, read_apart
 from app.loop.readings.records import Entry
 
@@ -69,6 +70,8 @@ def layout_of(layout: Layout, column: Column, unit: str | None) -> Layout:
         name: places for name, places in layout.columns.items() if name not in {"measured", "touches", "key", *ORIGIN}
     }
     own_unit = unit_of(layout.header[column.place], unit) or (layout.units[column.place] if layout.units else None)
+    if own_unit is None:
+        layout.refuse_doubt()
     return replace(layout, columns=fields | {"measured": (column.place,)}, said_unit=own_unit, skips_blank=True)
 
 

@@ -176,6 +176,19 @@ TABLES = {
         size="0",
         column="Deviation",
     ),
+    "title in inches": Case(
+        "Report 4711\nALL DIMENSIONS IN INCHES\nTime,D40\n2025-11-18 06:05,1.57480\n2025-11-18 06:06,1.57484\n",
+        morning(39.99992, 40.000936),
+    ),
+    "unit as the last word": Case(
+        "Time,D40 inches\n2025-11-18 06:05,1.57480\n2025-11-18 06:06,1.57484\n",
+        morning(39.99992, 40.000936),
+        column="D40 inches",
+    ),
+    "title of some unit": Case("Tolerances in µm\n" + THREE, words="nobody can tell", whole=True),
+    "nominal as a row": Case(
+        "Time;Part;D40\n;Nominal;40\n18.11.2025 06:05;P1;40,001\n;USL;40,008\n", bad=(2, 4), words="statistics"
+    ),
     "inches": Case(
         "Time,D40 (in)\n2025-11-18 06:05,1.57480\n2025-11-18 06:06,1.57484\n",
         morning(39.99992, 40.000936),
@@ -362,7 +375,9 @@ def names_of(case: Case) -> tuple[list[str], str]:
     if case.cells:
         return ["Date", "Time"] if "Date" in case.cells[0] else ["Time"], "D40"
     rows = [line for line in case.text.replace("\ufeff", "").splitlines() if line and "sep=" not in line]
-    head = next(line for line in rows if not line.startswith(("Plate", "Date:", "Job", "Unit:")))
+    head = next(
+        line for line in rows if not line.startswith(("Plate", "Date:", "Job", "Unit:", "Report", "ALL", "Tolerances"))
+    )
     cells = [cell.strip().strip('"') for cell in re.split(r"[;,\t]| {2,}", head.strip())]
     return cells, case.column or next(each for each in cells if each in {"D40", "Wert", "Value", "Measured", "Istmaß"})
 
@@ -442,6 +457,43 @@ def test_a_table_with_one_row_a_characteristic_is_sorted_by_its_names(plant: Pla
         entry = queries.entry_of(session, keys["Seal_1_D"])
         assert entry is not None
         assert [row["part"] for row in exporting.rows(session, entry)] == ["815", "816", "817"]
+
+
+@pytest.mark.parametrize("door", ["command", "page", "rest"])
+def test_the_name_in_a_row_says_the_unit_of_the_row(plant: Plant, tmp_path: Path, door: str) -> None:
+    key, path = plant.shop.another("long"), tmp_path / "chr.csv"
+    path.write_text(
+        f"Characteristic,Actual,Part\n{key} [inch],1.57480,P1\nAngle [deg],12.5,P1\n{key} [inch],1.57484,P2\n"
+    )
+    mapping = {f"{key} [inch]": key}
+    if door == "command":
+        assert plant.command(path, columns=f"{key} [inch]={key}") == ""
+    elif door == "page":
+        assert plant.page(path, key) == ""
+    else:
+        assert plant.table(path, path.read_text(), characteristics=mapping)["stored"] == 2
+    assert [size for size, _at in plant.stored(key)] == [39.99992, 40.000936]
+    columns = {"measured": "Actual", "characteristic": "Characteristic", "part": "Part"}
+    readings, faults, words = bridged(path, mapping, columns=columns, others="skip")
+    assert not faults, words
+    assert [size for size, _at in readings] == [39.99992, 40.000936]
+
+
+def test_a_row_whose_name_has_an_unknown_unit_is_no_millimetre(plant: Plant, tmp_path: Path) -> None:
+    key, path = plant.shop.another("long"), tmp_path / "chr.csv"
+    path.write_text("Characteristic,Actual,Part\nBore [furlong],40.001,P1\n")
+    assert plant.command(path, columns=f"Bore [furlong]={key}") == "refused 1"
+    assert plant.stored(key) == []
+    columns = {"measured": "Actual", "characteristic": "Characteristic"}
+    _readings, faults, words = bridged(path, {"Bore [furlong]": key}, columns=columns)
+    assert list(faults) == [2]
+    assert "furlong" in words
+
+
+def test_a_feature_and_its_characteristic_name_it_together(plant: Plant, tmp_path: Path) -> None:
+    path = tmp_path / "chr.csv"
+    path.write_text("Characteristic,Feature,Actual,Part\nDiameter,Circle 1,40.001,P1\nDiameter,Circle 2,20.002,P1\n")
+    assert look(path, Wishes()).names == ("Diameter Circle 1", "Diameter Circle 2")
 
 
 @pytest.mark.parametrize("door", ["command", "page", "rest"])

@@ -281,9 +281,9 @@ def test_the_line_of_the_column_names_is_found(tmp_path: Path, what: str) -> Non
 
 
 def test_the_lines_of_names_and_of_readings_can_be_said(tmp_path: Path) -> None:
-    path = write(tmp_path, "shift;35\nTeil;Messwert\nSoll;40\nA1;40,001\n")
+    path = write(tmp_path, "shift;35\nTeil;Messwert\nA0;40\nA1;40,001\n")
     assert look(path, Wishes(), complete=False).header == ("Teil", "Messwert"), "below a title with a number"
-    assert good(path, header_line=2) == [(40.0, "Soll"), (40.001, "A1")]
+    assert good(path, header_line=2) == [(40.0, "A0"), (40.001, "A1")]
     assert good(path, header_line=2, first_line=4) == [(40.001, "A1")]
     with pytest.raises(Invalid, match="Line 9 is empty"):
         read(path, header_line=9)

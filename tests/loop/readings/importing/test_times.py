@@ -169,9 +169,9 @@ def test_a_refusal_names_a_form_that_reads_it(tmp_path: Path, times: list[str], 
 def test_a_footer_without_a_time_is_no_reading(tmp_path: Path) -> None:
     path = tmp_path / "a.csv"
     path.write_text(
-        "n;time;actual\n1;18.11.2025 06:05:00;40,001\n2;;40,002\n3;18.11.2025 06:07:00;40,003\nMean;;40,002\n"
+        "nr;time;actual\n1;18.11.2025 06:05:00;40,001\n2;;40,002\n3;18.11.2025 06:07:00;40,003\nMean;;40,002\n"
     )
-    check(imported(path), "line 5, time: has no time, and no line below has one. If it is a sum or a mean")
+    check(imported(path), "line 5: 'Mean' holds limits or statistics, no part")
     path.write_text(path.read_text().replace("Mean;;40,002\n", ""))
     check(imported(path), ["2025-11-18T05:05:00", None, "2025-11-18T05:07:00"])
 

@@ -1,0 +1,122 @@
+"""Fields of a table by the names of its columns, in five languages, or as a person maps them."""
+
+from collections.abc import Mapping, Sequence
+
+from app.errors import FieldError, Invalid
+from app.files.formats import cell_values
+from app.files.formats.column_names import NAMES
+from app.files.formats.units import in_another_scale
+from app.language.i18n import _
+from app.loop.readings.origin import COLUMNS
+
+ORIGIN = COLUMNS[:2]
+"""Fields that are no choice of a person: they are there in what Inband wrote."""
+DRAWN = ("nominal", "upper", "lower", "natural_limit")
+"""Fields of a characteristic, not of its readings: they set it up where it is missing."""
+DATES = {"date", "datum", "дата", "датум"}
+FEATURES = {"feature", "feature name", "element", "elementname", "element name", "geometrieelement"}
+AXES = {"axis", "ax", "achse", "osa", "os", "оса", "ось"}
+TIMES = {"time", "zeit", "uhrzeit", "vreme", "cas", "время", "време"}
+
+
+def columns_of(header: tuple[str, ...], mapping: Mapping[str, str]) -> dict[str, tuple[int, ...]]:
+    """The places of each field: as a person maps it, else by the name of a column. Raises `Invalid`."""
+    problems: list[FieldError] = []
+    columns: dict[str, tuple[int, ...]] = {}
+    for name, column in mapping.items():
+        if name not in NAMES:
+            message = _("There is no field {name}; there are {names}.").format(name=repr(name), names=", ".join(NAMES))
+            problems.append(FieldError("map", message))
+        elif column:  # an empty one says: not in this file
+            places = _places(header, column)
+            if places is None:
+                message = _("There is no column {column}; the file has: {header}.")
+                message = message.format(column=repr(column), header=", ".join(header))
+                problems.append(FieldError(f"map {name}", message))
+            elif in_another_scale(header, name, places):
+                message = _("The column {column} names another scale; temperatures are in °C.").format(
+                    column=repr(column)
+                )
+                problems.append(FieldError(f"map {name}", message))
+            else:
+                columns[name] = places
+    if problems:
+        raise Invalid(problems[0].message, _("Nothing was imported."), errors=problems)
+    used_places = {place for places in columns.values() for place in places}
+    guesses = [guess for guess in guesses_of(header).items() if not in_another_scale(header, *guess)]
+    columns |= {name: guess for name, guess in guesses if name not in mapping and not used_places & set(guess)}
+    if "characteristic" in columns:
+        return columns
+    return {name: places for name, places in columns.items() if name not in DRAWN}
+
+
+def fits(names: Sequence[str], mapping: Mapping[str, str]) -> bool:
+    """Tell of names that have the columns which a person names, and one that is measured."""
+    columns = [column for column in mapping.values() if column and not column.isdigit()]
+    named = all(column in names or all(part.strip() in names for part in column.split("+")) for column in columns)
+    return named and ("measured" in mapping or "measured" in guesses_of(tuple(names)))
+
+
+def nominal_of(
+    header: tuple[str, ...], columns: Mapping[str, tuple[int, ...]], mapping: Mapping[str, str]
+) -> tuple[int, ...]:
+    """The column of nominal sizes, also where they set nothing up; none where a person says so."""
+    if "nominal" in columns or "nominal" in mapping or "measured" not in columns:
+        return columns.get("nominal", ())
+    guess = guesses_of(header).get("nominal", ())
+    return () if set(guess) & {place for places in columns.values() for place in places} else guess
+
+
+def _places(header: tuple[str, ...], column: str) -> tuple[int, ...] | None:
+    """Return the place of a column: by its name or number, or two that belong together as Date+Time or 2+3."""
+    place = _place(header, column)
+    if place is not None:
+        return (place,)
+    places = [_place(header, part.strip()) for part in column.split("+")]
+    named_places = tuple(place for place in places if place is not None)
+    return named_places if len(named_places) == len(places) else None
+
+
+def _place(header: tuple[str, ...], column: str) -> int | None:
+    if column in header:
+        return header.index(column)
+    if column.isascii() and column.isdigit() and len(column) < 6 and 1 <= int(column) <= len(header):
+        return int(column) - 1
+    return None
+
+
+def is_unsigned(column: str) -> bool:
+    """Tell of a column of lower deviations without a sign, which its name has: -TOL."""
+    return column.strip().lower().replace(" ", "") in {"-tol", "tol-", "-tolerance"}
+
+
+def guesses_of(header: tuple[str, ...]) -> dict[str, tuple[int, ...]]:
+    """The fields that the names of columns mean."""
+    names = [cell_values.folded(name) for name in header]
+    guesses: dict[str, tuple[int, ...]] = {}
+    for name, words in NAMES.items():
+        folded = [cell_values.folded(word) for word in words]
+        ranked = sorted((folded.index(each), place) for place, each in enumerate(names) if each in folded)
+        if ranked:
+            guesses[name] = (ranked[0][1],)
+    date = next((place for place, each in enumerate(names) if each in DATES), None)
+    time = next((place for place, each in enumerate(names) if each in TIMES), None)
+    if date is not None and time is not None:
+        guesses["measured_at"] = (date, time)
+    unsigned = [at for at, name in enumerate(header) if is_unsigned(name)]
+    if "lower" not in guesses and unsigned:
+        guesses["lower"] = (unsigned[0],)
+    features = [at for at, each in enumerate(names) if each in FEATURES]
+    if features and guesses.get("characteristic", (-1,))[0] not in features:
+        guesses["characteristic"] = tuple(
+            sorted((*guesses.get("characteristic", ()), features[0]))
+        )  # Circle 3, Diameter
+    beside = next((at for at, each in enumerate(names) if each in AXES), None)
+    if "characteristic" in guesses and beside is not None:
+        guesses["characteristic"] += (beside,)  # a feature has several: X, Y, D
+    elif "characteristic" not in guesses and "measured" in guesses and "nominal" in guesses:
+        named = names.index("id") if "id" in names else beside
+        guesses |= {} if named is None else {"characteristic": (named,)}
+    if set(COLUMNS) <= set(header):
+        guesses |= {name: (header.index(name),) for name in ORIGIN}
+    return guesses
