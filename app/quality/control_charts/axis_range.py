@@ -18,8 +18,8 @@ from app.quality.control_charts.view import View
 ROOM = 0.08
 TOO_FAR = 4.0  # times as far as limits and most points reach
 WITH_VALUES = 8  # points beyond that are labelled
-CLOSE = 0.05  # of the width of the chart: of points closer than this the farthest is labelled, behind the last of them
-LATE = 0.12  # of the width of the chart: of points nearer to its right edge the label stands before them, not beyond the edge
+CLOSE = 96  # px, the width of a label: of points closer than this the farthest is labelled, behind the last of them
+LATE = 0.12  # of the width of the chart, and room for a label at least: nearer to its right edge the label is before the points
 MOST = 0.04  # of the points on either side may lie beyond: a broken insert is seen on a few parts before it is changed
 FEW = 8  # points of which none is far
 UNSIGNED = (Chart.MOVING_RANGE, Chart.RANGES, Chart.DEVIATIONS)
@@ -51,8 +51,10 @@ def _open(low: float, high: float) -> tuple[float, float]:
     return low - room, high + room
 
 
-def beyond(view: View, drawn: NDArray[np.int64], links: list[object], low: float, high: float) -> list[Series]:
-    """The points that the axis does not reach, at its edge. links: what each drawn point opens."""
+def beyond(
+    view: View, drawn: NDArray[np.int64], links: list[object], low: float, high: float, width: int
+) -> list[Series]:
+    """The points that the axis does not reach, at its edge. links: what each drawn point opens; width: of the chart, px."""
     values = view.points[drawn] * 1000
     far = (values > high) | (values < low)
     if not far.any():
@@ -62,8 +64,8 @@ def beyond(view: View, drawn: NDArray[np.int64], links: list[object], low: float
     said = [f"{value:.0f} µm" if view.kind in UNSIGNED else f"{signed(value, 0)} µm" for value in values[far].tolist()]
     x = view.last[drawn[far]]
     wide = view.last[-1] - view.first[0]
-    late = x > view.last[-1] - LATE * wide
-    texts = _spaced(said, np.abs(values[far]), x, above, late, CLOSE * wide)
+    late = x > view.last[-1] - max(LATE, CLOSE / width) * wide
+    texts = _spaced(said, np.abs(values[far]), x, above, late, CLOSE / width * wide)
     beside = np.where(late, "middle left", "middle right").tolist()
     return [
         Series(

@@ -49,7 +49,7 @@ def control_figure(
         _points(view, view.points, drawn, links, picks=picks),
         *([] if view.below is None else [_points(view, view.below, drawn, links, picks=picks)]),
         *_signals(view, drawn, sides, links),
-        *beyond(view, drawn, [links(at) for at in drawn], low, high),
+        *beyond(view, drawn, [links(at) for at in drawn], low, high, width),
         *_names(view, width, high - low),
     ]
     height = Axis(_axis(view), reach=(low, high), format=_format(view.kind, high - low), ticks=7, fixed=picks)

@@ -243,6 +243,18 @@ def test_of_points_beyond_that_are_neighbours_the_farthest_is_labelled() -> None
     assert [label.strip() for label in beyond["text"]] == ["", "", "+400 µm", "−380 µm"]
 
 
+def test_labels_beyond_do_not_meet_in_a_narrow_chart() -> None:
+    values = [0.5, -0.5] * 50
+    values[20], values[32] = -400, -380
+    labelled = {
+        width: [
+            label.strip() for label in traces(control_figure(seen(values), key="shaft", width=width))["beyond"]["text"]
+        ]
+        for width in (1240, 620)
+    }
+    assert labelled == {1240: ["−400 µm", "−380 µm"], 620: ["", "−400 µm"]}
+
+
 def test_the_label_of_a_point_beyond_the_axis_stays_inside_the_chart() -> None:
     beyond = traces(control_figure(seen([*([0.5, -0.5] * 100), 390.0, 400.0, 395.0]), key="shaft"))["beyond"]
     assert [label.strip() for label in beyond["text"]] == ["+400 µm", "", ""], "before the first of them"
