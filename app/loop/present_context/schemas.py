@@ -15,7 +15,7 @@ class PresentContextIn(Body):
     """The work of a machine from now on; a field that is left out is not known."""
 
     order: Annotated[_Said | None, Field(description="Number of the order.")] = None
-    batch: Annotated[_Said | None, Field(description="Batch or charge of the material.")] = None
+    batch: Annotated[_Said | None, Field(description="Batch or heat of the material.")] = None
     nest: Annotated[
         int | None, Field(strict=True, ge=0, le=999_999, description="Number of the nest, if all parts are of one.")
     ] = None

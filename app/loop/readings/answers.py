@@ -189,7 +189,7 @@ class ReadingContextOut(BaseModel):
     """The circumstances of a reading, as they were sent with it; null where nothing was said."""
 
     order: Annotated[str | None, Field(description="Number of the order.")] = None
-    batch: Annotated[str | None, Field(description="Batch or charge of the material.")] = None
+    batch: Annotated[str | None, Field(description="Batch or heat of the material.")] = None
     nest: Annotated[int | None, Field(description="Number of the nest or cavity.")] = None
     spindle: Annotated[str | None, Field(description="The spindle that cut the part.")] = None
     fixture: Annotated[str | None, Field(description="The fixture, pallet or chuck in which it was cut.")] = None

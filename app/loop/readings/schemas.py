@@ -34,7 +34,7 @@ class Context(Struct, forbid_unknown_fields=True, omit_defaults=True):
     """The circumstances of a reading. Nothing but `by_hand` is of account for the decision; they are shown and handed on."""
 
     order: Annotated[_Text | None, Meta(description="Number of the order.")] = None
-    batch: Annotated[_Text | None, Meta(description="Batch or charge of the material.")] = None
+    batch: Annotated[_Text | None, Meta(description="Batch or heat of the material.")] = None
     nest: Annotated[
         Annotated[int, Meta(ge=0, le=999_999)] | None, Meta(description="Number of the nest or cavity.")
     ] = None

@@ -19,7 +19,7 @@ STEPS = {
     "tool_worn": (
         "Stop the machine after this part.",
         "Look at the cutting edge with the loupe.",
-        "Chipped or worn: turn the insert, then touch Tool replaced. Still good: Keep cutting.",
+        "Chipped or worn: turn the insert, then touch Tool changed. Still good: Keep cutting.",
     ),
     "probe_fault": (
         "Wipe the stylus and the seat of the part.",
