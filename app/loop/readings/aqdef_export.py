@@ -14,6 +14,7 @@ from sqlalchemy import select
 from sqlalchemy.orm import Session
 
 from app.core.decision.limits import Zone
+from app.core.decision.step import Code
 from app.core.parameters import Parameters
 from app.core.period import ALWAYS, Period
 from app.errors import Invalid, NotFound
@@ -150,9 +151,9 @@ def _values(session: Session, of: _Of, *, period: Period, last: int | None) -> I
 
 
 def _validity(row: dict[str, Any], as_it_came: str) -> int:
-    """K0002: of an excluded reading the one that it came with, if any."""
+    """K0002: of an excluded reading the one that it came with, if any; touches that cannot be believed are no good value."""
     if row["excluded"] is None:
-        return Validity.GOOD
+        return Validity.IMPLAUSIBLE if row["code"] == Code.TOUCH_FAULT else Validity.GOOD
     if as_it_came.isascii() and as_it_came.isdigit():
         return int(as_it_came)
     return Validity.IMPLAUSIBLE if row["zone"] == Zone.PROBE_FAULT else Validity.INVALID

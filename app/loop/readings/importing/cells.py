@@ -20,7 +20,7 @@ from app.files.formats.delimited import Row, Unusable
 from app.files.formats.headings import is_summary
 from app.files.formats.units import agreed, in_mm, unit_behind, unit_of_name
 from app.language.i18n import _
-from app.loop.readings.importing.columns import DRAWN, ORIGIN
+from app.loop.readings.importing.columns import DRAWN, ORIGIN, VERDICT
 from app.loop.readings.importing.layout import (
     NO_DIGIT,
     Layout,
@@ -28,6 +28,7 @@ from app.loop.readings.importing.layout import (
     look,
     named_in,
     rows_of,
+    text_of,
     written,
 )
 from app.loop.readings.origin import Origin
@@ -37,7 +38,8 @@ SHOWN = 60  # characters of a wrong value
 SHOWN_LINES = 12
 SHOWN_CELL = 40
 AT_ONCE = 20_000  # items in memory before they are put down
-_OF_CHARACTERISTIC = {"characteristic", *DRAWN}
+_NO_READING = {"characteristic", *DRAWN, *VERDICT}
+"""Columns that are no field of a reading."""
 
 
 class Flaw(NamedTuple):
@@ -239,6 +241,9 @@ def _of_row(row: Row, layout: Layout, readers: Sequence["_Reader"]) -> Iterator[
         yield Passed(row.line, _("has no size: its mark says that it is missing"))
         return
     values: dict[str, Any] = {}
+    if unfit := _unfit(*(text_of(row, layout.columns.get(name, ())) for name in VERDICT)):
+        yield Passed(row.line, unfit)
+        return
     flawed, behind = False, ""
     for name, places, read in readers:
         text = size = " ".join(row.cells[place] for place in places).strip()
@@ -255,6 +260,13 @@ def _of_row(row: Row, layout: Layout, readers: Sequence["_Reader"]) -> Iterator[
             yield Flaw(row.line, layout.named(name), shown(text), str(error))
     if not flawed:
         yield _in_mm(values, layout, row.line, behind, named_in(row.cells, layout))
+
+
+def _unfit(code: Any, excluded: Any) -> str | None:
+    """The reason for which a reading that Inband wrote counted for nothing there; None for any other."""
+    if code == "touch_fault":
+        return _("its touches could not be believed where it was exported")
+    return _("was excluded where it was exported") if excluded else None
 
 
 def _in_mm(
@@ -328,7 +340,7 @@ def _readers(layout: Layout) -> list[_Reader]:
         "touches": _touches,
         "context": _context,
     } | dict.fromkeys(TEMPERATURES, lambda text: length(text) if text else None)
-    columns = ((name, places) for name, places in layout.columns.items() if name not in _OF_CHARACTERISTIC)
+    columns = ((name, places) for name, places in layout.columns.items() if name not in _NO_READING)
     return [(name, places, kinds.get(name, lambda text: text or None)) for name, places in columns]
 
 
@@ -371,7 +383,7 @@ def _json(path: Path, layouts: Sequence[Layout]) -> Iterator[Item]:
             yield from (Item(place, number, found) for found in _of_object(number, value, layout))
 
 
-def _of_object(number: int, value: Any, layout: Layout) -> Iterator["dict[str, Any] | Flaw"]:
+def _of_object(number: int, value: Any, layout: Layout) -> Iterator["dict[str, Any] | Flaw | Passed"]:
     if isinstance(value, Flaw):
         yield value
         return
@@ -381,8 +393,11 @@ def _of_object(number: int, value: Any, layout: Layout) -> Iterator["dict[str, A
     values = {
         name: value.get(layout.header[places[0]])
         for name, places in layout.columns.items()
-        if name not in _OF_CHARACTERISTIC and value.get(layout.header[places[0]]) is not None
+        if name not in _NO_READING and value.get(layout.header[places[0]]) is not None
     }
+    if unfit := _unfit(*(value.get(name) if name in layout.columns else None for name in VERDICT)):
+        yield Passed(number, unfit)
+        return
     for name in ("part", "key"):
         if isinstance(values.get(name), int) and not isinstance(values[name], bool):
             values[name] = str(values[name])

@@ -11,6 +11,8 @@ from app.loop.readings.origin import COLUMNS
 
 ORIGIN = COLUMNS[:2]
 """Fields that are no choice of a person: they are there in what Inband wrote."""
+VERDICT = ("code", "excluded")
+"""Columns of the same, by which a reading that counted for nothing there does not count here."""
 DRAWN = ("nominal", "upper", "lower", "natural_limit")
 """Fields of a characteristic, not of its readings: they set it up where it is missing."""
 DATES = {"date", "datum", "дата", "датум"}
@@ -118,5 +120,5 @@ def guesses_of(header: tuple[str, ...]) -> dict[str, tuple[int, ...]]:
         named = names.index("id") if "id" in names else beside
         guesses |= {} if named is None else {"characteristic": (named,)}
     if set(COLUMNS) <= set(header):
-        guesses |= {name: (header.index(name),) for name in ORIGIN}
+        guesses |= {name: (header.index(name),) for name in (*ORIGIN, *VERDICT) if name in header}
     return guesses

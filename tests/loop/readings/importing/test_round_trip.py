@@ -13,7 +13,7 @@ from openpyxl import Workbook
 from app.db.engine import Database
 from app.files.formats import spreadsheet
 from app.files.formats.aqdef import Source
-from app.loop.readings import exporting, queries
+from app.loop.readings import actions, exporting, queries
 from app.loop.readings.aqdef_export import write_aqdef
 from app.loop.readings.importing.aqdef import actions as aqdef
 from app.loop.readings.importing.aqdef import matching
@@ -135,3 +135,26 @@ def test_a_size_that_was_changed_in_the_file_is_refused_by_line(plant: Database,
     assert [flaw.reason for flaw in refusal.value.flaws] == [
         f"belongs to reading 45, which measured 39.99123 mm, not {read} mm"
     ]
+
+
+@pytest.mark.parametrize("form", FORMS)
+def test_what_counted_for_nothing_does_not_count_elsewhere(database: Database, tmp_path: Path, form: str) -> None:
+    set_up(database)
+    with database.begin() as session:
+        entry = queries.entry_of(session, D40)
+    assert entry is not None
+    at = [datetime(2026, 3, 2, 5, minute, tzinfo=UTC) for minute in range(4)]
+    pushed = [
+        ReadingIn(D40, measured=39.991, measured_at=at[0]),
+        ReadingIn(D40, touches=[[None]], measured_at=at[1]),
+        ReadingIn(D40, measured=39.998, measured_at=at[2]),
+        ReadingIn(D40, measured=39.993, measured_at=at[3]),
+    ]
+    in_thread(lambda: store_batch(database, {}, [(entry, each) for each in pushed]))
+    with database.begin() as session:
+        actions.exclude(session, entry, 3, "tests", "chip in the bore")
+    out = exported(database, tmp_path / f"out.{form}")
+    assert imported(database, out)[0] == 0
+    imported(database, out, D41)
+    counting = "SELECT array_agg(measured ORDER BY sequence) FROM reading r WHERE characteristic_id = 2 AND NOT EXISTS (SELECT FROM exclusion e WHERE e.characteristic_id = 2 AND e.sequence = r.sequence)"
+    assert scalar(database, counting) == [39.991, 39.993]
