@@ -100,21 +100,29 @@ def unusual_calibration(values: Mapping[str, Any]) -> list[Problem]:
 def unusual_on(values: Mapping[str, Any], machine: MachineType) -> list[Problem]:
     """Warn of what does not fit the type of a machine. values: parameters by name, as far as they are known.
 
-    Two-point measurement is for machining centres (R24, domain §2); on a lathe the offset acts against the size, so that no
-    factor is positive (domain §3).
+    Two-point measurement is for machining centres (R24, domain §2). On a lathe the offset acts against the size, and so does a
+    milling radius outside; inside, a larger radius makes a larger hole or pocket: there alone is the factor positive (domain §3).
 
     >>> given = {"factor": 0.5, "tool_memory": 3}
-    >>> [problem.code for problem in unusual_on(given, MachineType.LATHE)], unusual_on(given, MachineType.MILL)
-    (['factor_on_lathe'], [])
+    >>> [problem.code for problem in unusual_on(given, MachineType.LATHE)]
+    ['factor_on_lathe']
+    >>> [problem.code for problem in unusual_on(given, MachineType.MILL)], unusual_on({**given, "feature": "inside"}, MachineType.MILL)
+    (['factor_outside'], [])
+    >>> [problem.code for problem in unusual_on({**given, "factor": -0.5, "feature": "inside"}, MachineType.MILL)]
+    ['factor_inside']
     """
-    if machine is not MachineType.LATHE:
-        return []
     problems = []
-    if values.get("variant") == Variant.TWO_POINT:
+    if machine is MachineType.LATHE and values.get("variant") == Variant.TWO_POINT:
         problems.append(Problem("variant", "not_on_lathe", {}, warning=True))
-    factor = values.get("factor")
-    corrects = values.get("tool_memory") and values.get("mode") != Mode.MEASURE_ONLY
-    corrects = corrects and values.get("feature") != Feature.TOOL
-    if isinstance(factor, int | float) and factor > 0 and corrects:
-        problems.append(Problem("factor", "factor_on_lathe", {"value": factor}, warning=True))
-    return problems
+    factor, feature = values.get("factor"), values.get("feature", Feature.OUTSIDE)
+    corrects = values.get("tool_memory") and values.get("mode") != Mode.MEASURE_ONLY and feature != Feature.TOOL
+    if not corrects or isinstance(factor, bool) or not isinstance(factor, int | float):
+        return problems
+    code = ""
+    if factor > 0 and machine is MachineType.LATHE:
+        code = "factor_on_lathe"
+    elif factor > 0 and feature == Feature.OUTSIDE:
+        code = "factor_outside"
+    elif factor < 0 and feature == Feature.INSIDE and machine is MachineType.MILL and values.get("axis") != Axis.Z:
+        code = "factor_inside"
+    return [*problems, Problem("factor", code, {"value": factor}, warning=True)] if code else problems

@@ -286,6 +286,14 @@ def _of_tools(problem: Problem) -> dict[str, str]:
             "The factor {value} is positive, but this machine is a lathe: −1 in diameter, −0.5 in radius, −1 in length. "
             "With the wrong sign every correction makes the part worse"
         ).format(value=f"{data.get('value', 0):+.10g}"),
+        "factor_outside": _(
+            "The factor {value} is positive, but what is touched is outside: −1 in diameter or length, −0.5 in radius. Only inside, "
+            "with a milling radius, is it positive. With the wrong sign every correction makes the part worse"
+        ).format(value=f"{data.get('value', 0):+.10g}"),
+        "factor_inside": _(
+            "The factor {value} is negative, but what is touched is inside and the machine mills: a larger radius makes a larger hole, "
+            "so +0.5. With the wrong sign every correction makes the part worse"
+        ).format(value=f"{data.get('value', 0):+.10g}"),
         "sign_missing": _(
             "The factor is missing: it says which way the offset acts. Lathe diameter −1, radius −0.5, length −1; "
             "milling radius −0.5 outside, +0.5 inside"

@@ -145,8 +145,33 @@ class TestSetUp:
         )  # fmt: skip
         assert [(each["code"], each["field"]) for each in made["warnings"]] == [(code, f"parameters.{field}")]
         common_shop.call("PATCH", f"/machines/{common_shop.machine}", type="mill")
-        if code in {"not_on_lathe", "factor_on_lathe"}:
-            assert common_shop.call("GET", f"/characteristics/{made['key']}")["warnings"] == []
+        on_a_mill = [each["code"] for each in common_shop.call("GET", f"/characteristics/{made['key']}")["warnings"]]
+        assert on_a_mill == {"not_on_lathe": [], "factor_on_lathe": ["factor_outside"]}.get(code, [code])
+
+    @pytest.mark.parametrize(
+        ("machine", "given", "codes"),
+        [
+            ("mill", {"factor": -0.5}, []),
+            ("mill", {"factor": 0.5, "feature": "inside"}, []),
+            ("mill", {"factor": -1, "feature": "inside", "axis": "Z"}, []),  # a length
+            ("mill", {"factor": 0.5}, ["factor_outside"]),
+            ("other", {"factor": 1}, ["factor_outside"]),
+            ("mill", {"factor": -0.5, "feature": "inside"}, ["factor_inside"]),
+            ("other", {"factor": -1, "feature": "inside"}, []),  # a bore that is turned
+            ("mill", {"factor": 0.5, "mode": "measure_only"}, []),
+        ],
+    )
+    def test_a_factor_of_the_other_sign_is_warned_of(
+        self, shop: Shop, machine: str, given: dict[str, Any], codes: list[str]
+    ) -> None:
+        shop.call("PATCH", f"/machines/{shop.machine}", type=machine)
+        body: dict[str, Any] = {
+            "key": f"{shop.characteristic}-b",
+            "name": "x",
+            "machine": shop.machine,
+            "parameters": PARAMETERS | given,
+        }
+        assert [each["code"] for each in shop.call("POST", "/characteristics", 201, **body)["warnings"]] == codes
 
     def test_a_taken_key_is_a_conflict_and_an_unknown_machine_is_named(self, common_shop: Shop) -> None:
         body: dict[str, Any] = {"name": "x", "parameters": PARAMETERS}
@@ -194,7 +219,7 @@ class TestChange:
         entry = common_shop.call("GET", f"/audit?subject=characteristic/{common_shop.characteristic}")["items"][0]
         assert (entry["before"], entry["after"], entry["why"]) == (
             {"zero_range": 0.001, "mode": "automatic"},
-            {"zero_range": 0.002, "mode": "approval"},
+            {"zero_range": 0.002, "mode": "approval", "superseded": [1]},
             "new probe",
         )
 
