@@ -11,9 +11,11 @@ from app.core.parameters import Parameters
 from app.loop.alarms.reading_kinds import HOLDING
 from app.loop.characteristics import queries as characteristics
 from app.loop.characteristics.corrections import open_corrections
+from app.loop.machines import keys
 from app.loop.machines import queries as machines
 from app.loop.tables.alarms import Alarm
 from app.loop.tables.characteristics import Characteristic
+from app.loop.tables.connections import Connection
 from app.loop.tables.machines import Machine
 from app.loop.tables.readings import Reading
 from app.loop.tables.tools import Correction, Tool
@@ -66,6 +68,13 @@ def groups(session: Session, machine: Machine | None = None) -> list[Group]:
 def group_of(session: Session, machine: Machine, tool: int) -> Group | None:
     """Group of the waiting corrections of this tool; None if there are none."""
     return next((group for group in _of_machine(session, machine) if group.tool.number == tool), None)
+
+
+def to_enter(session: Session, machine: Machine) -> list[Waiting]:
+    """Pending corrections that a person enters at the control, the oldest first: the machine has neither a key nor a bridge."""
+    if session.get(Connection, machine.id) is not None or keys.keys_by_machine(session).get(machine.id):
+        return []
+    return _with_readings(session, machine, queries.corrections(session, machine, statuses=("pending",), limit=MOST))
 
 
 def _of_machine(session: Session, machine: Machine) -> list[Group]:

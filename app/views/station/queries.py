@@ -23,8 +23,8 @@ URGENCY = {state: place for place, state in enumerate(CharacteristicState)}
 class Station(NamedTuple):
     """Content of the station of a machine: `first` in giant digits, the `others` small; active alarms, the most urgent first.
 
-    tools: the tools that its characteristics are cut with. waiting: corrections to decide about that no active alarm holds,
-    the oldest first; together: of the tools of which several await approval, what approving all of them comes to.
+    tools: the tools that its characteristics are cut with. waiting: corrections to decide about that no active alarm holds, and those to enter
+    at the control, the oldest first; together: of the tools of which several await approval, what approving all of them comes to.
     """
 
     machine: Machine
@@ -52,7 +52,10 @@ def station(session: Session, machine: str) -> Station:
         alarms.active_count(session, group.machine.id),
         sorted({row.parameters.tool_memory for row in rows if row.parameters.tool_memory}),
         sorted(
-            (each for tool in waiting for each in tool.waiting if each.alarm is None),
+            [
+                *(each for tool in waiting for each in tool.waiting if each.alarm is None),
+                *approvals.to_enter(session, group.machine),
+            ],
             key=lambda each: each.row.correction.number,
         ),
         [tool for tool in waiting if len(tool.approvable) > 1],

@@ -17,5 +17,8 @@ def next_action(station: Station) -> str:
     if station.waiting:
         first = station.waiting[0]
         amount = read_um(first.row.correction.amount, first.parameters.half)
+        if first.row.correction.status == "pending":
+            tool = first.row.correction.tool_memory
+            return _("Add {amount} to the offset of tool {tool}").format(amount=amount, tool=tool)
         return _("Decide on the correction of {amount}").format(amount=amount)
     return _("Nothing to do")

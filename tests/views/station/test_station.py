@@ -8,7 +8,7 @@ from playwright.sync_api import Page, expect
 
 from app.language.numbers import um
 from tests.pages.looks import boxes
-from tests.shop import Person, Shop
+from tests.shop import PARAMETERS, Person, Shop, unique
 
 UPRIGHT: Any = {"width": 800, "height": 1280}
 ACROSS: Any = {"width": 1280, "height": 800}
@@ -48,6 +48,21 @@ class TestWithoutScripts:
         shop.add(key, mode="approval", tool_memory=4, average_memory=6)
         shop.read(6.0, key)
         assert "Approve the correction of −6.0" in viewer.open(f"/station/{shop.machine}")
+
+    def test_where_no_program_takes_a_correction_a_person_enters_it(self, shop: Shop, operator: Person) -> None:
+        machine, key = unique("bench"), unique("ring")  # neither a key nor a bridge
+        shop.call("POST", "/machines", 201, key=machine, name="Bench", control="other")
+        shop.call("POST", "/characteristics", 201, key=key, name="Ring", machine=machine, parameters=PARAMETERS)
+        assert shop.read(6.0)["correction"]["status"] == shop.read(6.0, key)["correction"]["status"] == "pending"
+        assert "to the offset" not in operator.open(f"/station/{shop.machine}")
+        here = f"/station/{machine}"
+        text = operator.open(here)
+        assert '<p class="station-action">Add −6.0\xa0µm to the offset of tool 3</p>' in text
+        assert "then mark it applied" in text
+        assert f"{here}/corrections/1?do=applied" in text
+        assert "Correction pending" in operator.open(f"/characteristics/{key}")
+        operator.send(f"{here}/corrections/1", do="applied")
+        assert '<p class="station-action">Nothing to do</p>' in operator.open(here)
 
     def test_a_correction_is_approved_or_rejected(self, shop: Shop, operator: Person, viewer: Person) -> None:
         key = f"{shop.characteristic}-approval"
