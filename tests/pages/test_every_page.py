@@ -164,7 +164,7 @@ PRINTED = {"/", "/overview", "/characteristics/{characteristic}"}
 
 CONTROLS = """() => [...document.querySelectorAll(
     "button, .button, .tabs, .choice, .picker, .rail, .foot, .chart-strip, form[method=get], form[method=get] *")]
-    .filter((each) => each.checkVisibility() && !each.matches(".sorts, .why > button")).map((each) => each.outerHTML.slice(0, 120))"""
+    .filter((each) => each.checkVisibility() && !each.matches("a.sorts, .why > button")).map((each) => each.outerHTML.slice(0, 120))"""
 MOST_SHEETS = 24  # of a page of this house
 BOOKS = {"/api/docs"}
 """Pages that print all that is folded in, hundreds of sheets: who prints one wants the book."""

@@ -73,6 +73,7 @@ function equip(table) {
     const button = document.createElement("button");
     button.type = "button";
     button.className = "sorts";
+    head.dataset.words = wordsOf(head); // for paper
     const term = head.querySelector("[data-term]"); // a link beside the button, not in it
     button.append(...[...head.childNodes].filter((node) => node !== term));
     button.addEventListener("click", () => {
