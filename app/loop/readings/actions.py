@@ -1,6 +1,7 @@
 """Actions of people on stored readings. The readings themselves are written by the writer alone."""
 
 from collections.abc import Sequence
+from datetime import UTC, datetime
 
 from sqlalchemy import select, update
 from sqlalchemy.dialects.postgresql import insert
@@ -11,10 +12,13 @@ from app.db.events import publish
 from app.errors import Conflict
 from app.language.i18n import _
 from app.language.times import in_sentence
+from app.loop.characteristics.corrections import correction_changed
 from app.loop.machines.queries import lock_machines
 from app.loop.readings import queries
 from app.loop.readings.records import Entry
+from app.loop.tables.machines import Machine
 from app.loop.tables.readings import Exclusion, Reading, Stream
+from app.loop.tables.tools import OUTSTANDING, Correction
 
 
 def exclude(session: Session, entry: Entry, sequence: int, actor: str, reason: str) -> Exclusion:
@@ -62,7 +66,7 @@ def exclude(session: Session, entry: Entry, sequence: int, actor: str, reason: s
         "reading excluded",
         f"reading/{entry.characteristic}/{sequence}",
         before={"excluded": False},
-        after={"excluded": True},
+        after={"excluded": True} | _withdraw(session, entry, sequence, actor, reason),
         why=reason,
     )
     publish(
@@ -117,6 +121,27 @@ def exclude_all(session: Session, entry: Entry, sequences: Sequence[int], actor:
             },
         )
     return excluded
+
+
+def _withdraw(session: Session, entry: Entry, sequence: int, actor: str, reason: str) -> dict[str, list[int]]:
+    """Reject the correction that a reading asked for, where it is on its way: a false reading is no reason for it.
+
+    What is held, its alarm decides; program text that was fetched may be in the control by now. Returns what the record says.
+    """
+    machine = session.get_one(Machine, entry.machine_id)
+    asked = select(Correction).where(
+        Correction.machine_id == entry.machine_id,
+        Correction.characteristic_id == entry.characteristic_id,
+        Correction.sequence == sequence,
+        Correction.status.in_(OUTSTANDING),
+        Correction.fetched_at.is_(None),
+    )
+    rows = session.scalars(asked.order_by(Correction.number).execution_options(populate_existing=True)).all()
+    for correction in rows:
+        correction.status, correction.reason = "rejected", reason
+        correction.decided_at, correction.decided_by = datetime.now(UTC), actor
+        publish(session, correction_changed(session, machine, correction))
+    return {"rejected": [correction.number for correction in rows]} if rows else {}
 
 
 REMEMBERED = 8  # readings after which what one of them was makes no difference to the level (1/2 to the 8th of it)

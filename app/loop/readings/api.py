@@ -212,7 +212,9 @@ def get_reading(
 def exclude_reading(
     session: SessionDep, caller: Operator, characteristic: CharacteristicKey, sequence: Sequence, exclusion: ExcludeIn
 ) -> ReadingDetail:
-    """Take a reading out of the statistics, never out of the record."""
+    """Take a reading out of the statistics, never out of the record. A correction that it asked for and that is not applied yet is
+    rejected; what was applied stays.
+    """
     entry = queries.entry_for(session, caller, characteristic)
     actions.exclude(session, entry, sequence, caller.name, exclusion.reason)
     return ReadingDetail.model_validate(queries.detail(session, entry, sequence))

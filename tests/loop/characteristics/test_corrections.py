@@ -73,3 +73,27 @@ def test_the_page_says_once_which_correction_fell(shop: Shop) -> None:
     sentence = f"Correction {number} was computed with the parameters before and is superseded"
     assert sentence in engineer.open(f"{path}?done=changed")
     assert sentence not in engineer.open(path)
+
+
+def test_a_false_reading_takes_the_correction_along_that_it_asked_for(shop: Shop) -> None:
+    number = shop.read(20)["correction"]["number"]
+    shop.call("POST", f"/readings/{shop.characteristic}/1/exclude", reason="chip on the stylus")
+    fallen = shop.correction(number)
+    assert (fallen["status"], fallen["status_reason"]) == ("rejected", "chip on the stylus")
+    assert shop.read(0)["correction"] is None, "nothing is outstanding any more"
+    assert shop.call("GET", f"/audit?subject=reading/{shop.characteristic}/1")["items"][0]["after"] == {
+        "excluded": True,
+        "rejected": [number],
+    }
+    applied = shop.read(20)["correction"]["number"]
+    shop.correction(applied, "applied")
+    shop.call("POST", f"/readings/{shop.characteristic}/3/exclude", reason="chip on the stylus")
+    assert shop.correction(applied)["status"] == "applied", "it is in the offset"
+
+
+def test_a_key_twice_in_a_batch_names_no_reading_that_is_not_there(shop: Shop) -> None:
+    rows = [{"characteristic": shop.characteristic, "measured": size, "key": "e1"} for size in (40.0, 40.001)]
+    answer = shop.admin.post("/api/v1/readings/batch", json=rows)
+    assert answer.status_code == 409
+    assert f"Key e1 of {shop.characteristic} comes twice: with 40.0 mm and with 40.001 mm." in answer.json()["detail"]
+    assert shop.call("GET", f"/readings?characteristic={shop.characteristic}")["items"] == []

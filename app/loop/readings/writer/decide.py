@@ -227,6 +227,13 @@ def _first_with_key(pending: PendingWrites, entry: Entry, key: str, reading: Rea
     sequence, value = first.sequence, first.measured
     measured = _measured(first.parameters, reading).value
     if round(value - measured, DECIMALS) != 0:
+        if here is not None:
+            words = _("Key {key} of {characteristic} comes twice: with {first} mm and with {now} mm.")
+            raise Conflict(
+                words.format(key=key, characteristic=entry.characteristic, first=value, now=measured),
+                _("A key names one reading for ever. Give each reading a key of its own."),
+                errors=[FieldError("key", _("This key is taken by another value."))],
+            )
         raise Conflict(
             _(
                 "Key %(key)s belongs to reading %(sequence)s of %(characteristic)s, which measured %(first)s mm, not %(now)s mm."
