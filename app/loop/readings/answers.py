@@ -78,7 +78,11 @@ class IssuedCorrection(BaseModel):
     tool_memory: Annotated[int, Field(description="R10: the tool memory location whose offset is to be changed.")]
     amount: Annotated[float, Field(description="Add this to the offset, mm.")]
     status: Annotated[
-        str, Field(description="pending: apply it; held or awaiting_approval: a person decides first, so do not.")
+        str,
+        Field(
+            description="As it was issued. pending: apply it; held or awaiting_approval: a person decides first, so do not. What has "
+            "become of it since: GET /corrections/{machine}/{number}."
+        ),
     ]
 
 
