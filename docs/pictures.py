@@ -19,6 +19,7 @@ from app import HOUSE
 
 IMAGES = HOUSE / "docs" / "images"
 COLOURS = 112  # of a picture
+LONGEST = 60  # s that the charts of a page may take
 DRAWN = "() => [...document.querySelectorAll('plotly-chart')].every((chart) => chart.drawn)"
 
 
@@ -50,8 +51,12 @@ def taken(browser: Browser, url: str, people: dict[str, str], picture: Picture) 
     page = browser.new_page(base_url=url, viewport={"width": width, "height": height}, color_scheme="light")
     _sign_in(page, people)
     page.goto(picture.address)
-    while not page.evaluate(DRAWN):  # the page's policy lets no string be evaluated in it again and again
+    for _tenth in range(LONGEST * 10):  # the page's policy lets no string be evaluated in it again and again
+        if page.evaluate(DRAWN):
+            break
         page.wait_for_timeout(100)
+    else:
+        raise SystemExit(f"{picture.address}: a chart is not drawn after {LONGEST} s")
     part = page.locator(picture.part)
     part.scroll_into_view_if_needed()
     box = part.bounding_box()
