@@ -21,7 +21,7 @@ from app import HOUSE, __version__
 from app.db.replica import Replica
 from app.errors import InbandError
 from app.language import i18n, numbers, short, times
-from app.web import period, states, theme
+from app.web import cards, period, states, theme
 from app.web.assets import Assets
 from app.web.doors import door_of, machine_of, search_words, way_to
 from app.web.help_ways import help_of
@@ -75,6 +75,7 @@ def environment() -> Environment:
     )
     env.install_gettext_callables(i18n._, i18n.ngettext, newstyle=True)  # type: ignore[attr-defined]
     env.filters.update(
+        labelled=cards.labelled,
         um=numbers.um,
         read_um=numbers.read_um,
         um_limit=numbers.um_limit,

@@ -48,6 +48,29 @@ def test_headers_sort_and_a_field_filters(hall: Shop, viewer: Person, page: Page
     expect(page.locator("#machines tbody tr:visible")).to_have_count(len(NAMES) + 1)
 
 
+@pytest.mark.browser
+def test_cards_of_a_phone_name_their_columns_and_sort_where_they_are_seen(
+    hall: Shop, viewer: Person, page: Page
+) -> None:
+    written = viewer.open("/setup/machines")
+    assert re.search(r'<td[^>]* data-label="Characteristics">', written), "without scripts, too"
+    viewer.sign_in(page)
+    page.set_viewport_size({"width": 390, "height": 844})
+    page.goto("/setup/machines")
+    rows = page.locator("#machines tbody tr")
+    page.get_by_label("Sort by").first.select_option("Name ▾")
+    expect(rows.first).to_contain_text("Mill 10")
+    page.get_by_label("Sort by").first.select_option("Name ▴")
+    expect(rows.last).to_contain_text("Mill 10")
+    page.get_by_label("Show rows with").focus()
+    page.keyboard.press("Tab")
+    assert page.evaluate("document.activeElement.closest('tbody') !== null"), "no head that nobody sees is between"
+    page.goto("/setup/characteristics?q=ring")
+    page.locator("summary", has_text="Sort by").click()
+    page.locator(".sort-by").get_by_role("link", name="Characteristic").click()
+    expect(page.locator(".sort-by [aria-current]")).to_have_count(1)
+
+
 def test_the_server_filters_by_name_where_a_list_has_pages(hall: Shop, viewer: Person) -> None:
     def listed(query: str) -> list[str]:
         return re.findall(r'<code class="quiet">([^<]+)</code>', viewer.open(f"/setup/characteristics?{query}"))

@@ -4,7 +4,7 @@
 //   th[data-fixed]    a column that is not sorted
 //   td[data-value]    what is sorted by in place of the text
 //
-//   table.as-cards    on a phone its rows are cards: each cell gets the name of its column (data-label, components.css)
+//   data-sort="…"     the label of the choice that sorts it where its rows are cards and have no heads (components.css)
 //
 // Numbers sort as numbers (−12.5, 1,234.5 µm), times of <time-ago> by their moment, words as people sort them, a choice by what is
 // chosen. A second click turns the order. Without script the table is as the server made it. A live part that is fetched again keeps order and filter.
@@ -60,6 +60,28 @@ function filter(table, text) {
   }
 }
 
+function sortBy(table) {
+  const label = document.createElement("label");
+  label.className = "sort-by";
+  const select = document.createElement("select");
+  select.id = `${nameOf(table)}-sort`;
+  select.append(new Option("–", ""));
+  for (const [column, head] of [...table.tHead.rows[0].cells].entries())
+    if (head.dataset.words)
+      for (const way of ["ascending", "descending"])
+        select.append(new Option(`${head.dataset.words} ${way === "ascending" ? "▴" : "▾"}`, `${column} ${way}`));
+  const { column, descending } = kept.get(nameOf(table)) ?? {};
+  if (column !== undefined) select.value = `${column} ${descending ? "descending" : "ascending"}`;
+  select.addEventListener("change", () => {
+    if (!select.value) return;
+    const [chosen, way] = select.value.split(" ");
+    sort(table, Number(chosen), way === "descending");
+    remember(table, { column: Number(chosen), descending: way === "descending" });
+  });
+  label.append(table.dataset.sort, " ", select);
+  table.closest(".table-wrap").before(label);
+}
+
 function remember(table, changes) {
   kept.set(nameOf(table), { ...kept.get(nameOf(table)), ...changes });
 }
@@ -84,6 +106,7 @@ function equip(table) {
     head.prepend(button);
   }
   if (before.column !== undefined) sort(table, before.column, before.descending);
+  if (table.dataset.sort && table.tBodies[0].rows.length > 1) sortBy(table);
   if (table.dataset.filter && table.tBodies[0].rows.length >= LONG) {
     const label = document.createElement("label");
     label.className = "table-filter";
@@ -104,15 +127,6 @@ function equip(table) {
 const wordsOf = (head) =>
   [...head.childNodes].filter((node) => !node.matches?.("[data-term]")).map((node) => node.textContent).join("").trim();
 
-function label(table) {
-  const names = [...(table.tHead?.rows[0].cells ?? [])].map(wordsOf);
-  for (const row of table.tBodies[0]?.rows ?? [])
-    for (const [column, cell] of [...row.cells].entries()) if (names[column]) cell.dataset.label ??= names[column];
-}
-
-const equipAll = () => {
-  document.querySelectorAll("table.as-cards").forEach(label); // before the heads become buttons
-  document.querySelectorAll("table[data-sortable]").forEach(equip);
-};
+const equipAll = () => document.querySelectorAll("table[data-sortable]").forEach(equip);
 equipAll();
 document.addEventListener("livepart", equipAll);
