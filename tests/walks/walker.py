@@ -59,6 +59,8 @@ CHANGES: tuple[dict[str, Any], ...] = (
     {"tool_memory": 4},
     {"tool_memory": 13},
     {"tool_memory": 0},
+    {"factor": 1},
+    {"target": 40.004},
     {"average_memory": 0},
     {"average_memory": 6},
     {"wear_policy": "release"},

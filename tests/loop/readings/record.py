@@ -76,6 +76,19 @@ BROKEN = (
     "SELECT machine_id, correction FROM reading WHERE correction IS NOT NULL GROUP BY 1, 2 HAVING count(*) > 1",
     # one held correction per tool at most
     "SELECT machine_id, tool_memory FROM correction WHERE status = 'held' GROUP BY 1, 2 HAVING count(*) > 1",
+    # no open correction leads elsewhere than the parameters of now
+    """SELECT c.*, was.parameters, force.parameters FROM correction c
+           JOIN reading r USING (machine_id, characteristic_id, sequence)
+           JOIN stream s USING (machine_id, characteristic_id)
+           JOIN parameters_version was ON was.machine_id = c.machine_id AND was.characteristic_id = c.characteristic_id
+               AND was.version = r.parameters_version
+           JOIN parameters_version force ON force.machine_id = c.machine_id AND force.characteristic_id = c.characteristic_id
+               AND force.version = s.parameters_version
+       WHERE c.status IN ('held', 'awaiting_approval', 'pending') AND (
+           c.tool_memory <> s.tool_memory OR force.parameters ->> 'mode' = 'measure_only'
+           OR was.parameters -> 'factor' <> force.parameters -> 'factor'
+           OR was.parameters -> 'target' <> force.parameters -> 'target'
+           OR (force.parameters ->> 'mode' = 'approval' AND was.parameters ->> 'mode' <> 'approval'))""",
     # the sum of a tool is that of its applied corrections since it was changed; the offset is that of its last step
     """SELECT t.*, c.total FROM tool t JOIN LATERAL (
            SELECT coalesce(sum(amount), 0) AS total FROM correction c
