@@ -336,6 +336,16 @@ class TestKeys:
         assert fields(problem) == {"key"}
         assert "belongs to reading 1" in problem["detail"]
 
+    @pytest.mark.parametrize("first", [{}, {"first_move_triggered": True}])
+    def test_the_same_key_hides_no_probe_fault(self, shop: Shop, first: dict[str, Any]) -> None:
+        triggered: dict[str, Any] = {"first_move_triggered": not first}
+        shop.read(7.0, key="lathe:1", **first)
+        assert fields(refused(shop, 409, measured=40.007, key="lathe:1", **triggered)) == {"key"}
+        shop.call("POST", "/readings", 200, characteristic=shop.characteristic, measured=40.007, key="lathe:1", **first)
+        one = {"characteristic": shop.characteristic, "measured": 40.007, "key": "lathe:2"}
+        batch = shop.machine_client.post("/api/v1/readings/batch", json=[one | first, one | triggered])
+        assert batch.status_code == 409
+
     def test_a_key_is_unique_per_characteristic_only(self, shop: Shop) -> None:
         other = f"{shop.characteristic}-b"
         shop.add(other, average_memory=6)

@@ -215,7 +215,7 @@ def _measured(parameters: Parameters, reading: ReadingIn) -> Measured:
 
 
 def _first_with_key(pending: PendingWrites, entry: Entry, key: str, reading: ReadingIn) -> Verdict | Stored | None:
-    """Return the first reading with this key, here or in the record; the same key with another value is refused.
+    """Return the first reading with this key, here or in the record; the same key with another value or probe fault is refused.
 
     Points are made into a value as they were then, whatever the characteristic expects by now.
     """
@@ -225,6 +225,20 @@ def _first_with_key(pending: PendingWrites, entry: Entry, key: str, reading: Rea
     if first is None:
         return None
     sequence, value = first.sequence, first.measured
+    if reading.first_move_triggered is not first.first_move_triggered:
+        if first.first_move_triggered:
+            words = _(
+                "Key {key} belongs to a reading of {characteristic} for which the probe triggered on its first move."
+            )
+        else:
+            words = _(
+                "Key {key} belongs to a reading of {characteristic} for which the probe did not trigger on its first move."
+            )
+        raise Conflict(
+            words.format(key=key, characteristic=entry.characteristic),
+            _("A key names one reading for ever. Give the new reading a key of its own."),
+            errors=[FieldError("key", _("This key is taken by a reading that differs in first_move_triggered."))],
+        )
     measured = _measured(first.parameters, reading).value
     if round(value - measured, DECIMALS) != 0:
         if here is not None:

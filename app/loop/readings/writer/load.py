@@ -33,7 +33,7 @@ ParametersCache = dict[tuple[int, int], Parameters]
 class _Loaded(msgspec.Struct):
     streams: list[tuple[LoadedStream, LoadedAverage | None, LoadedTool | None]]
     named: list[tuple[int, int, datetime | None, datetime | None, datetime | None]] | None
-    known: list[tuple[int, str, int, float, int]] | None
+    known: list[tuple[int, str, int, float, int, bool]] | None
 
 
 _loaded = msgspec.json.Decoder(_Loaded)
@@ -115,9 +115,9 @@ async def _load(
             snapshot.averages[average.machine_id, average.location] = average
         if tool is not None:
             snapshot.tools[tool.machine_id, tool.number] = tool
-    for c, key, sequence, measured, version in loaded.known or ():
+    for c, key, sequence, measured, version, first_move in loaded.known or ():
         parameters = await _parameters(pipeline, book, entries[c], version)
-        snapshot.stored_keys[c, key] = KnownKey(sequence, measured, parameters)
+        snapshot.stored_keys[c, key] = KnownKey(sequence, measured, parameters, first_move)
     return {int(machine or 0) for machine, _last, _version, planned in locked if planned == b"t"}
 
 

@@ -372,6 +372,11 @@ class Verdict:
     measure_next: int | None = None
     _record: Record | None = None
 
+    @property
+    def first_move_triggered(self) -> bool:
+        """Tell if the probe triggered on its way to the surface."""
+        return self.reading.first_move_triggered
+
     def record(self) -> Record:
         """Return the row to store, and to answer from; every alarm has its number by now."""
         if self._record is None:

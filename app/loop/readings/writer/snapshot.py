@@ -126,11 +126,12 @@ class LoadedPlan(NamedTuple):
 
 
 class KnownKey(NamedTuple):
-    """A stored reading whose key has come again."""
+    """A stored reading whose key has come again. first_move_triggered: as it was sent."""
 
     sequence: int
     measured: float
     parameters: Parameters
+    first_move_triggered: bool
 
 
 @dataclass(slots=True)

@@ -131,7 +131,8 @@ SELECT json_build_object(
     ),
     'named', (SELECT json_agg(json_build_array(machine_id, number, applied_at, decided_at, fetched_at)) FROM named),
     'known', (
-        SELECT json_agg(json_build_array(r.characteristic_id, r.key, r.sequence, r.measured, r.parameters_version))
+        SELECT json_agg(json_build_array(r.characteristic_id, r.key, r.sequence, r.measured, r.parameters_version,
+            r.code = 'first_move_triggered'))
         FROM json_to_recordset((SELECT d -> 'keys' FROM doc)) AS w(machine_id int, characteristic_id int, key text)
         CROSS JOIN LATERAL (
             SELECT * FROM reading
