@@ -6,7 +6,7 @@ What a period means is in `app.core.period`, how it is written in `app.files.for
 from functools import partial
 from typing import Annotated, Any, NamedTuple
 
-from fastapi import Depends, Query
+from fastapi import Depends, Query, Request
 from pydantic import BeforeValidator, WithJsonSchema
 from pydantic_core import PydanticCustomError
 
@@ -71,10 +71,14 @@ ENDING = "Before this moment, which does not belong to the period itself; a day 
 
 
 def period_in_query(
+    request: Request,
     start: Annotated[Beginning | None, Query(alias="from", description=BEGINNING, examples=[None])] = None,
     end: Annotated[Ending | None, Query(alias="to", description=ENDING, examples=[None])] = None,
 ) -> Period:
     """The period that a program asks for."""
+    said = request.query_params
+    if start is not None and start == end and cell_values.day(said["to"]) is not None:
+        raise periods.backwards(said["from"], said["to"])  # the day after that day
     return periods.in_order(Period(start, end))
 
 

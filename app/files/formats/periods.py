@@ -60,7 +60,7 @@ def period_of(fields: Mapping[str, str], zone: ZoneInfo | None = None) -> Period
         )
     period = Period(bounds["from"], bounds["to"])
     if period.bounded and period.start == period.end and cell_values.day(fields["to"]) is not None:
-        raise _backwards(fields["from"], fields["to"])  # the day after that day
+        raise backwards(fields["from"], fields["to"])  # the day after that day
     return in_order(period)
 
 
@@ -69,10 +69,11 @@ def in_order(period: Period) -> Period:
     if period.backwards:
         assert period.start is not None
         assert period.end is not None
-        raise _backwards(period.start.isoformat(), period.end.isoformat())
+        raise backwards(period.start.isoformat(), period.end.isoformat())
     return period
 
 
-def _backwards(start: str, end: str) -> Invalid:
+def backwards(start: str, end: str) -> Invalid:
+    """The refusal of a period that is written so."""
     message = _("{start} is later than `to` {end}; exchange the two").format(start=start, end=end)
     return Invalid.at("from", message, do=_("Exchange the two moments."))

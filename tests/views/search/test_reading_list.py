@@ -116,6 +116,7 @@ def test_the_key_of_a_machine_sees_its_own(lathes: TwoLathes) -> None:
         ({"part": "a\0b"}, "part"),
         ({"part": "x" * 129}, "part"),
         ({"from": at(5), "to": at(1)}, "from"),
+        ({"from": "2026-03-05", "to": "2026-03-04"}, "from"),
         ({"from": "yesterday"}, "from"),
     ],
 )
