@@ -159,6 +159,7 @@ class Note:
     size: float = 12
     colour: Colour = "quiet"
     ground: bool = False  # written on a ground of the chart's own, so that lines stop at it
+    detail: bool = False  # given up where the chart is too low for it (chart-details.js)
 
 
 Mark = Series | Bars | Rule | Ground | Note

@@ -272,6 +272,8 @@ class _Figure:
             "font": {"size": note.size, "color": self.colour(note.colour)},
         }
         written |= {key: by for key, by in zip(("xshift", "yshift"), note.shift, strict=True) if by}
+        if note.detail:
+            written["name"] = "detail"
         return written | ({"bgcolor": self.colour("surface"), "borderpad": 1} if note.ground else {})
 
 

@@ -14,6 +14,7 @@
 // it is old, and how old.
 
 import { ChartCursor } from "./chart-cursor.js";
+import { withoutCrowded } from "./chart-details.js";
 import { gestures } from "./chart-gestures.js";
 import { scalable } from "./chart-paper.js";
 import { ChartStrip } from "./chart-strip.js";
@@ -120,6 +121,7 @@ class PlotlyChart extends HTMLElement {
     });
     this.plot.on("plotly_doubleclick", () => this.movable && this.view.shown && this.view.show(null));
     scalable(this.plot);
+    withoutCrowded(this.plot);
     this.cursor.listen();
   }
 

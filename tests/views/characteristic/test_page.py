@@ -304,3 +304,21 @@ def test_decisions_and_versions_are_folded_until_an_address_names_them(page: Pag
         page.goto("about:blank")
         page.goto(f"{path(shop)}#{name}")
         expect(shown).to_be_visible()
+
+
+@pytest.mark.browser
+def test_words_in_the_bands_give_way_where_the_chart_is_too_low(shop: Shop, viewer: Person, page: Page) -> None:
+    shop.read(0.4)
+    viewer.sign_in(page)
+    shown = {}
+    for height in (600, 1100):
+        page.set_viewport_size({"width": 1280, "height": height})
+        page.goto(path(shop))
+        expect(page.locator("plotly-chart.zones .annotation").first).to_be_attached()
+        until(lambda: page.locator("plotly-chart.zones").evaluate("chart => chart.drawn === true"))
+        words = page.locator("plotly-chart.zones .annotation")
+        shown[height] = [
+            sum(each.is_visible() for each in words.filter(has_text=text).all())
+            for text in ("corrected in full", "averaging limit")
+        ]
+    assert shown == {600: [0, 2], 1100: [4, 2]}

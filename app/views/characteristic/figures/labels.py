@@ -122,19 +122,19 @@ def limit_labels(limits: HasLimits, ruler: Scale, size: int, *, brief: bool = Fa
             room = (upper - max(lower, written)) / height
             if isinstance(ruler, ZoneScale):
                 if band.number > 0:
-                    notes.append(_note(sign * (lower + upper) / 2, band_text(band, sign), "quiet", size))
+                    notes.append(_note(sign * (lower + upper) / 2, band_text(band, sign), "quiet", size, detail=True))
                 elif sign > 0 or ruler.natural.side:
                     middle_of = sign * (lower + upper) / 2 if ruler.natural.side else 0
                     notes.append(_note(middle_of, band_text(band, sign), "ink", size))
             elif room > 1.6 * LEAST_DISTANCE and band.number > 0:
                 place = max((max(lower, written) + upper) / 2, written + LEAST_DISTANCE * height)
                 written = place
-                notes.append(_note(sign * place, band_text(band, sign), "quiet", size))
+                notes.append(_note(sign * place, band_text(band, sign), "quiet", size, detail=True))
     return [note for note in notes if note.text]
 
 
-def _note(y: float, text: str, colour: Role, size: int) -> Note:
-    return Note(text, Share(1), y, "left", shift=(8, 0), size=size, colour=colour)
+def _note(y: float, text: str, colour: Role, size: int, *, detail: bool = False) -> Note:
+    return Note(text, Share(1), y, "left", shift=(8, 0), size=size, colour=colour, detail=detail)
 
 
 def _signed_limit(deviation: float) -> str:
