@@ -18,6 +18,7 @@ from app.loop.tables.connections import Connection
 def _deviation(alarm: Alarm, text: str) -> str:
     values = {
         "deviation": read_um(alarm.data.get("deviation"), alarm.data.get("limit")),
+        "decided": read_um(alarm.data.get("decided"), alarm.data.get("limit")),
         "limit": tolerance_um(alarm.data.get("limit") or 0.0, alarm.data.get("natural_limit")),
     }
     return f"{text.format(tool=alarm.tool_memory, **values)}{_against(alarm)}"
@@ -42,6 +43,13 @@ def _against(alarm: Alarm) -> str:
 
 
 def _tool_worn(alarm: Alarm) -> str:
+    data = alarm.data
+    if "decided" in data and abs(data["deviation"]) < data["limit"] <= abs(data["decided"]):
+        text = _(
+            "Deviation {deviation} counts as {decided}, which has reached the wear limit {limit}: corrections that are not confirmed are "
+            "counted in. Either one of them is in the offset already, or the tool is worn or broken."
+        )
+        return _deviation(alarm, text)
     text = _("Deviation {deviation} has reached the wear limit {limit}: tool {tool} is worn or broken.")
     if alarm.tool_memory is None:
         text = _("Deviation {deviation} has reached the wear limit {limit}: the tool is worn or broken.")

@@ -17,7 +17,7 @@ from app.loop.readings.wording import reason
 from app.loop.tables.alarms import Alarm
 from app.web import states
 from app.web.templates import environment
-from tests.shop import PARAMETERS
+from tests.shop import PARAMETERS, Shop
 
 
 @pytest.mark.parametrize("kind", list(kinds()), ids=lambda kind: kind.name)
@@ -116,3 +116,13 @@ def test_so_it_is_with_every_reason_of_a_decision() -> None:
 def test_a_name_is_taken_once() -> None:
     with pytest.raises(ValueError, match="two alarm kinds are called signal"):
         register(kind_named("signal"))
+
+
+def test_a_tool_is_called_worn_by_what_its_part_shows(shop: Shop) -> None:
+    shop.read(-299.0)
+    shop.read(1.5)
+    (worn,) = [each for each in shop.alarms() if each["kind"] == "tool_worn"]
+    assert worn["text"].startswith(
+        "Deviation +2\xa0µm counts as +300.5\xa0µm, which has reached the wear limit ±300\xa0µm"
+    )
+    assert "one of them is in the offset already" in worn["text"]
