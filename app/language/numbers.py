@@ -213,9 +213,9 @@ def typed_length(length_mm: float) -> str:
 
 
 def as_read(moment: datetime, style: str = "seconds") -> str:
-    """A moment in the time zone of the plant, as people read it. Style: `seconds`, `minutes` or `date`."""
+    """A moment in the time zone of the plant, as people read it. Style: `seconds`, `minutes`, `date` or `time`."""
     there = local(moment)
-    pattern = {"seconds": "d MMM y HH:mm:ss", "minutes": "d MMM y HH:mm", "date": "d MMM y"}[style]
+    pattern = {"seconds": "d MMM y HH:mm:ss", "minutes": "d MMM y HH:mm", "date": "d MMM y", "time": "HH:mm"}[style]
     text = format_datetime(there, pattern, tzinfo=plant_zone(), locale=current_locale())
     return f"{text} {offset(there)}" if style != "date" and is_twice(there) else text
 
