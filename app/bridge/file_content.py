@@ -404,7 +404,8 @@ class _Reader:
             return
         body: dict[str, Any] = {"characteristic": key}
         try:
-            form = self.form.in_unit(unit, fields.get("unit"), unit_of_name(name))
+            said = fields.get("unit")
+            form = self.form.in_unit(unit, said, unit_of_name(name, unit or (str(said) if said else None)))
         except Unreadable as error:
             hint = "" if fields.get("unit") is None else ' If this column holds no units, set columns.unit = "".'
             self._fault(line, self.settings.columns.get("unit", "unit"), f"{error}.{hint}")

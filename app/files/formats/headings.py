@@ -8,33 +8,11 @@ from app.files.formats import delimited
 from app.files.formats.cell_values import folded
 from app.files.formats.column_names import SUMMARIES
 from app.files.formats.delimited import Row
-from app.files.formats.units import is_unit_column, length_unit
+from app.files.formats.units import OTHER_UNITS, is_unit_column, length_unit
 
 TOP = 500  # rows in which the heading is looked for
 FIRST = 50  # of them, in which another may stand than the one that is found
 TABLE = 2  # rows of values that make a table
-OTHER_UNITS = {
-    "",
-    "-",
-    "–",
-    "°",
-    "deg",
-    "grad",
-    "rad",
-    "%",
-    "s",
-    "min",
-    "h",
-    "n",
-    "kn",
-    "nm",
-    "kg",
-    "g",
-    "°c",
-    "bar",
-    "rpm",
-}
-"""Words of a row of units that are none of length."""
 
 
 class Heading(NamedTuple):

@@ -39,6 +39,10 @@ _WORDS: Final[dict[str, str]] = {
     }.items()
     for word in words.split()
 }
+OTHER_UNITS: Final = frozenset(
+    ["", "-", "–", "°", "deg", "grad", "rad", "%", "s", "min", "h", "n", "kn", "nm", "kg", "g", "°c", "bar", "rpm"]
+)
+"""Words of a row of units, or in a name, that are none of length."""
 _ONLY_AS_WRITTEN: Final = {"nm": {"nm"}, "m": {"m"}, "mm": {"mm", "MM"}}
 """Units whose other cases are something else: Nm is a torque, M a million, Mm a million metres."""
 _BRACKETS: Final = re.compile(r"\[([^\[\]]*)\]|\(([^()]*)\)|<([^<>]*)>")
@@ -54,6 +58,21 @@ _UNMISTAKABLE: Final = frozenset(
 """Words that mean a unit wherever they stand in a name. Others do at its end only: *um* is a German word, *in* an English one."""
 _AT_END: Final = re.compile(r"(?:[_,;/ ]|(?<=\d))(mm|MM|[uµμ]m|nm|cm|mils?|tenths?|[uµμ]in)$", re.IGNORECASE)
 _INCHES_AT_END: Final = re.compile(r"""(?:[_,;/] ?|(?<=\d) ?)(in\.?|"|'')$""", re.IGNORECASE)
+_CAPITAL_WITHIN: Final = re.compile(r"(?<=[a-zß-ÿ])(?=[A-ZА-Я])")
+_SCALED: Final = re.compile(
+    r"""1\s*/\s*10+\s*(?:mm|[uµμ]m|in|inch|inches|zoll|")(?!\w)|(?:\b(?:in|u|v|в|у)\s+|[\[(=:]\s*)\d+(?:[.,]\d+)?\s*(?:mm|[uµμ]m|in|inch|inches|zoll)(?!\w)"""
+    r"""|\b(?:mm|inch|in)\s*(?:/|\*|x|×)\s*10+\b|\b(?:ten|hundredths?)[- ]?thou(?:sandths?)?s?\b"""
+    r"""|\b(?:thousandths|hundredths|tausendstel|hundertstel|zehntel)\b""",
+    re.IGNORECASE,
+)
+"""Such as *1/1000 mm*: sizes counted in parts or multiples of a unit."""
+_TOLERANCE: Final = re.compile(r"(?<![\w.,])\d+(?:[.,]\d+)?\s*(?:[uµμ]m|microns?)(?!\w)")
+"""Such as the 5 µm of *Run-out 5 µm*, a tolerance rather than the unit of the sizes."""
+_OTHER_AT_END: Final = re.compile(
+    r"(?:(?:[_,;/ ]|(?<=\d))(ft|feet|yd|yards|dm|decimet(?:er|re)s?|[µμ])|(?<=[\w)] )(in\.?)|[-.](in|ft))$",
+    re.IGNORECASE,
+)
+"""Lengths that are not known, and *in* where it may be inches as well as a word: *Bore in*."""
 _AXES: Final = frozenset("xyzuvwijkrdlpt")
 """Letters in square brackets that say which size it is: *CIR1 [X]*."""
 _NO_UNITS: Final = (
@@ -105,11 +124,23 @@ class UnknownUnit(Exception):
 
 
 @lru_cache(maxsize=4096)
-def unit_of_name(name: str) -> str | None:
-    """The unit that the name of a characteristic carries in its rows: *D1 [inch]*. Raises `Unreadable` for one that is not known."""
+def unit_of_name(name: str, said: str | None = None) -> str | None:
+    """The unit that the name of a characteristic carries in its rows: *D1 [inch]*. Raises `Unreadable` for one that is not known.
+
+    said: the unit of its size by column, row, cell or person; then a word that may be no unit, such as in *Bore (top)*, is none.
+    """
     try:
         return unit_in(name)
     except UnknownUnit as error:
+        word = error.word.lower()
+        if said and not (
+            word in OTHER_UNITS
+            or _OTHER_TITLE.fullmatch(word)
+            or "," in word
+            or any(map(str.isdigit, word))
+            or "thou" in word
+        ):
+            return None
         words = _("{name} names the unit {word}, which is no length that is known ({known})")
         raise Unreadable(words.format(name=name[:40], word=repr(error.word), known=", ".join(LENGTHS))) from None
 
@@ -121,13 +152,15 @@ def unit_in(header: str) -> str | None:
 
     >>> unit_in("Wert [µm]"), unit_in("размер (мкм)"), unit_in("D40_mm"), unit_in("D (X)"), unit_in("measured")
     ('um', 'um', 'mm', None, None)
-    >>> unit_in("D40 inches"), unit_in("Bore_in"), unit_in("width, mil"), unit_in('D 1.5"'), unit_in("D1 [X]"), unit_in("Plug in")
+    >>> unit_in("D40 inches"), unit_in("boreInches"), unit_in("width, mil"), unit_in('D 1.5"'), unit_in("D1 [X]"), unit_in("in feed")
     ('inch', 'inch', 'mil', 'inch', None, None)
     >>> unit_in("Run-out [furlong]")
     Traceback (most recent call last):
         ...
     app.files.formats.units.UnknownUnit: furlong
     """
+    if match := _SCALED.search(header[:LONGEST_SIZE]) or _TOLERANCE.search(header[:LONGEST_SIZE]):
+        raise UnknownUnit(match[0].strip(" [(=:"))
     unknown = None
     for square, round_, angle in _BRACKETS.findall(header):
         word = (square or round_ or angle).strip()
@@ -145,12 +178,14 @@ def unit_in(header: str) -> str | None:
     named = _unmistakable(header)
     if len(set(map(length_unit, named))) > 1:
         raise UnknownUnit(", ".join(named))
+    if not named and (match := _OTHER_AT_END.search(header)):
+        raise UnknownUnit(match[1] or match[2] or match[3])
     return length_unit(named[0]) if named else None
 
 
 def _unmistakable(text: str) -> list[str]:
     """The words of a text that mean a unit of length wherever they stand, as they are written."""
-    words = _WORDS_OF.findall(text.replace("\N{GREEK SMALL LETTER MU}", "\N{MICRO SIGN}"))
+    words = _WORDS_OF.findall(_CAPITAL_WITHIN.sub(" ", text.replace("\N{GREEK SMALL LETTER MU}", "\N{MICRO SIGN}")))
     return [word for word in words if word.lower() in _UNMISTAKABLE and length_unit(word)]
 
 
@@ -225,6 +260,9 @@ _SIZES_IN: Final = re.compile(
 _ALONE: Final = re.compile(r"[\[(<]\s*([^\s\[\]()<>]{1,12})\s*[\])>]")
 _QUANTITY: Final = re.compile(r"\d\s*[^\W\d_]+")
 """Such as the 2 µm of an uncertainty: that is no unit of the table."""
+_OTHER_TITLE: Final = re.compile(
+    r"(?:ft|feet|yd|yards|dm|furlongs?|imperial|thousandths|tenths|[µμ])\.?", re.IGNORECASE
+)
 _ABBREVIATED, _NAME_AND_VALUE = 2, 2
 
 
@@ -243,7 +281,7 @@ def unit_above(titles: Iterable[Sequence[str]]) -> str | None:
         ...
     app.files.formats.units.UnknownUnit: µm
     """
-    said, mentioned = dict[str, None](), list[str]()
+    said, mentioned, scaled = dict[str, None](), list[str](), list[str]()
     for cells in titles:
         filled = [cell.strip()[:LONGEST_SIZE] for cell in cells if cell.strip()]
         for at, cell in enumerate(filled):
@@ -252,7 +290,11 @@ def unit_above(titles: Iterable[Sequence[str]]) -> str | None:
             if len(filled) == 1:  # a title; in a row of several cells it may be of one column
                 words += [*_ALONE.findall(cell), cell if len(cell) > _ABBREVIATED else ""]
             said |= {unit: None for word in words if (unit := length_unit(word.rstrip(".")))}
+            mentioned += [word for word in words if _OTHER_TITLE.fullmatch(word)]
+            scaled += [match[0] for match in _SCALED.finditer(cell)]
             mentioned += _unmistakable(_QUANTITY.sub("", cell)) if len(filled) <= _NAME_AND_VALUE else []
+    if scaled:
+        raise UnknownUnit(", ".join(dict.fromkeys(scaled)))
     several = list(said) if said else [word for word in mentioned if length_unit(word) != "mm"]
     if len(several) > bool(said):
         raise UnknownUnit(", ".join(dict.fromkeys(several)))

@@ -278,7 +278,7 @@ def _in_mm(
     """
     said = values.pop("unit", None)
     try:
-        unit = agreed(layout.said_unit, said, behind, unit_of_name(name))
+        unit = agreed(layout.said_unit, said, behind, unit_of_name(name, layout.said_unit or said or behind or None))
     except Unreadable as error:
         column = layout.named("unit") if said else layout.named("measured")
         reason = str(error)

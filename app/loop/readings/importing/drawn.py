@@ -83,7 +83,11 @@ def _length(name: str, drawn: Drawn, layout: Layout, field: str) -> float | None
     if not text:
         return None
     try:
-        unit = agreed(unit_in(layout.named(field)) or layout.said_unit, drawn.unit, unit_of_name(name))
+        unit = agreed(
+            unit_in(layout.named(field)) or layout.said_unit,
+            drawn.unit,
+            unit_of_name(name, layout.said_unit or drawn.unit or None),
+        )
         length: float = in_mm(read_number(text), unit)
     except (NotANumber, Unreadable, UnknownUnit) as error:
         reason = str(error) if isinstance(error, Unreadable) else _("is not a number, or in no unit that is known")

@@ -186,6 +186,18 @@ TABLES = {
         column="D40 inches",
     ),
     "title of some unit": Case("Tolerances in µm\n" + THREE, words="nobody can tell", whole=True),
+    "title of a part of a unit": Case("Alle Maße in 1/1000 mm\n" + THREE, words="1/1000 mm", whole=True),
+    "title of a length that is not known": Case("All dimensions in feet\n" + THREE, words="feet", whole=True),
+    "part of a unit": Case(
+        THREE.replace("D40", "D40 [1/1000 mm]"), words="1/1000 mm", whole=True, column="D40 [1/1000 mm]"
+    ),
+    "a tenth of a thou": Case(
+        THREE.replace("D40", "D40 ten-thou"), words="ten-thou", whole=True, column="D40 ten-thou"
+    ),
+    "in that may be inches": Case(THREE.replace("D40", "Bore in"), words="in", whole=True, column="Bore in"),
+    "feet": Case(THREE.replace("D40", "D40_ft"), words="ft", whole=True, column="D40_ft"),
+    "a tolerance in the name": Case(THREE.replace("D40", "Bore 5 µm"), words="5 µm", whole=True, column="Bore 5 µm"),
+    "inches in one word": Case("Time,boreInches\n2025-11-18 06:05,1.57480\n", morning(39.99992), column="boreInches"),
     "nominal as a row": Case(
         "Time;Part;D40\n;Nominal;40\n18.11.2025 06:05;P1;40,001\n;USL;40,008\n", bad=(2, 4), words="statistics"
     ),
@@ -376,7 +388,9 @@ def names_of(case: Case) -> tuple[list[str], str]:
         return ["Date", "Time"] if "Date" in case.cells[0] else ["Time"], "D40"
     rows = [line for line in case.text.replace("\ufeff", "").splitlines() if line and "sep=" not in line]
     head = next(
-        line for line in rows if not line.startswith(("Plate", "Date:", "Job", "Unit:", "Report", "ALL", "Tolerances"))
+        line
+        for line in rows
+        if not line.startswith(("Plate", "Date:", "Job", "Unit:", "Report", "All ", "Alle ", "ALL", "Tolerances"))
     )
     cells = [cell.strip().strip('"') for cell in re.split(r"[;,\t]| {2,}", head.strip())]
     return cells, case.column or next(each for each in cells if each in {"D40", "Wert", "Value", "Measured", "Istmaß"})
@@ -488,6 +502,16 @@ def test_a_row_whose_name_has_an_unknown_unit_is_no_millimetre(plant: Plant, tmp
     _readings, faults, words = bridged(path, {"Bore [furlong]": key}, columns=columns)
     assert list(faults) == [2]
     assert "furlong" in words
+
+
+def test_a_word_in_a_name_is_no_unit_where_the_unit_is_said(plant: Plant, tmp_path: Path) -> None:
+    key, path = plant.shop.another("long"), tmp_path / "chr.csv"
+    columns = {"measured": "Actual [mm]", "characteristic": "Characteristic"}
+    for name, taken in (("Bore (top)", True), ("Angle (deg)", False), ("Bore [1/1000 mm]", False)):
+        path.write_text(f"Characteristic,Actual [mm],Part\n{name},40.001,P1\n")
+        assert (plant.command(path, columns=f"{name}={key}", mapping="measured=Actual [mm]") == "") == taken
+        assert (bridged(path, {name: key}, columns=columns)[1] == []) == taken
+    assert [size for size, _at in plant.stored(key)] == [40.001]
 
 
 def test_a_feature_and_its_characteristic_name_it_together(plant: Plant, tmp_path: Path) -> None:
