@@ -437,7 +437,9 @@ def unusual_natural(given: Mapping[str, Any], parameters: Parameters, name: str)
     given: what was sent, by name or R number. name: of the characteristic.
     """
     if parameters.natural_limit is NaturalLimit.NONE:
-        return [Problem("natural_limit", "natural_likely", {"name": name}, warning=True)] if looks_natural(name) else []
+        at_zero = nanometres(abs(parameters.target)) <= nanometres(parameters.tolerance_width)
+        likely = looks_natural(name) and at_zero
+        return [Problem("natural_limit", "natural_likely", {"name": name}, warning=True)] if likely else []
     said = any(raw == "natural_limit" and value is not None for raw, value in given.items())
     sizes = {"R42", "R40", "R41", "NOMINAL", "UPPER_DEVIATION", "LOWER_DEVIATION"} & {raw.upper() for raw in given}
     if said or not sizes:

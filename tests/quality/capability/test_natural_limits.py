@@ -103,6 +103,11 @@ def test_a_limit_that_was_taken_for_natural_is_named_and_can_be_refused(shop: Sh
     assert "no offset corrects it" in refused["detail"]
 
 
+def test_a_size_far_from_0_is_no_form_whatever_its_name(shop: Shop) -> None:
+    changed = shop.call("PATCH", f"/characteristics/{shop.characteristic}", name="ra-g", reason="as on the drawing")
+    assert changed["warnings"] == []
+
+
 def test_what_no_part_can_be_is_a_probe_fault(shop: Shop) -> None:
     key = shop.another("below", **RUN_OUT)
     answer = shop.call("POST", "/readings", 201, characteristic=key, measured=-0.002)
