@@ -85,6 +85,8 @@ def message(error: Mapping[str, Any]) -> str:
         return _("must be a number of readings from 1 on, such as 500, or one of: {words}").format(
             words=", ".join(words)
         )
+    if kind == "too_long" and isinstance(error.get("input"), str):  # of a text that was read in another way first
+        kind = "text_too_long"
     sentence = _with_values(kind, context)
     return str(error.get("msg", kind)) if sentence is None else sentence + _unit_of(error)
 
@@ -113,6 +115,7 @@ def _with_values(kind: str, context: Mapping[str, Any]) -> str | None:
         "less_than_equal": _("must be at most {le}"),
         "string_pattern_mismatch": _("must have the form {pattern}"),
         "too_long": _("must have at most {max_length} items, not {actual_length}"),
+        "text_too_long": _("must have at most {max_length} characters, not {actual_length}"),
         "too_short": _("must have at least {min_length} items"),
     }
     sentence = sentences.get(kind)

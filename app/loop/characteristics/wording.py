@@ -4,6 +4,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from math import isfinite
 from typing import Any, NamedTuple, Protocol, TypeVar
 
+from app.core.decision.limits import nanometres
 from app.core.parameters import BY_NAME, TWO_POINT_SWITCH, Field, FieldKind, Problem, Variant, mean_nominal
 from app.errors import FieldError
 from app.language.i18n import _, ngettext
@@ -199,6 +200,11 @@ def sentence(problem: Problem) -> str:
     """The sentence of a problem: the error and what to do."""
     data, name = problem.data, named(problem.field)
     if problem.code == "order":
+        if data["smaller"] != data["larger"] and nanometres(data["smaller"]) == nanometres(data["larger"]):
+            return _(
+                "{inner} and {outer} are the same to a nanometre (0.000001 mm), finer than which nothing is compared; lower the "
+                "one or raise the other"
+            ).format(inner=data["inner"], outer=data["outer"])
         return order_sentence(data["inner"], data["outer"], millimetres(data["smaller"]), millimetres(data["larger"]))
     if problem.code in {"range", "source_range"}:
         return _range(problem, name)
@@ -375,6 +381,8 @@ def _not_a_number(problem: Problem, name: str) -> str:
             "{name} must be a number in mm, or a size with a tolerance class of ISO 286 such as 40 h6 (up to 500 mm); "
             "R40 and R41 stay empty then"
         ).format(name=name)
+    if problem.field in BY_NAME and BY_NAME[problem.field].kind is FieldKind.WHOLE:
+        return _("{name} must be a whole number, in JSON without quotation marks").format(name=name)
     return _("{name} must be a finite number, in mm with a decimal point where it is a length").format(name=name)
 
 

@@ -367,6 +367,14 @@ ORDER = [
         "averaging_limit",
         "R33 zero range 0.0050 mm must be smaller than R34 averaging limit 0.0050 mm; lower the one or raise the other",
     ),
+    (
+        {"R33": 0, "R34": 1e-10},
+        "averaging_limit",
+        (
+            "R33 and R34 are the same to a nanometre (0.000001 mm), finer than which nothing is compared; lower the one or raise "
+            "the other"
+        ),
+    ),
     ({"R37": 0.0079}, "wear_limit", "R37 wear limit 0.0079 mm must not be smaller than R35/2 = 0.0080 mm; raise it"),
     (
         {"R36": 0.299999},
@@ -381,6 +389,11 @@ def test_a_broken_order_names_the_pair_and_what_to_do(
     common_shop: Shop, given: dict[str, float], field: str, message: str
 ) -> None:
     assert change(common_shop, 422, **given)["errors"] == [{"field": f"parameters.{field}", "message": message}]
+
+
+def test_a_whole_number_as_text_is_no_length(common_shop: Shop) -> None:
+    wrong = change(common_shop, 422, R10="3")["errors"][0]["message"]
+    assert wrong == "R10 tool memory must be a whole number, in JSON without quotation marks"
 
 
 NUMBERS = [field.name for field in FIELDS if field.kind in {"length", "number", "whole"}]

@@ -49,6 +49,11 @@ def version_of(shop: Shop) -> int:
     return int(row[0])
 
 
+def test_a_long_text_is_refused_by_its_characters(shop: Shop) -> None:
+    wrong = beat(shop, 422, detail="x" * 1001)["errors"][0]["message"]
+    assert wrong == "must have at most 1000 characters, not 1001"
+
+
 def test_the_last_heartbeat_is_shown(shop: Shop) -> None:
     shop.call("GET", f"/machines/{shop.machine}/connection", 404)
     beat(shop)
