@@ -14,6 +14,7 @@ from app.core.fits import fit_of
 from app.core.natural import looks_natural
 from app.core.parameters import AVERAGE_LOCATIONS, BY_NAME
 from app.core.plausibility import suggested_jump
+from app.core.suggested import SuggestedLimits
 from app.core.variants import forms_of
 from app.errors import Conflict, InbandError, Invalid
 from app.language.i18n import _
@@ -110,8 +111,16 @@ def _with_suggestions(session: Session, form: Mapping[str, str]) -> dict[str, st
 
 
 def _all_errors(error: InbandError, form: Mapping[str, str]) -> dict[str, str]:
-    """Errors of the names and of the parameters together, each once."""
-    errors = [*error.errors, *actions.refusals(parameter_form.parameters_from(form))]
+    """Errors of the names and of the parameters together, each once.
+
+    Limits that are to be suggested once the tolerance is known are no errors; without a tool the rest is looked at as with one.
+    """
+    unsaid = {name for name in SuggestedLimits._fields if not form.get(name, "").strip()}
+    assumed = dict(form) | dict.fromkeys(unsaid, "1")
+    if not form.get("tool_memory", "").strip():
+        assumed["tool_memory"] = "1"
+    errors = [each for each in error.errors if each.field.removeprefix("parameters.") not in unsaid]
+    errors += actions.refusals(parameter_form.parameters_from(assumed))
     return by_field(Invalid(error.detail, errors=dict.fromkeys(errors)))
 
 

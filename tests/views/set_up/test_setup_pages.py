@@ -172,10 +172,19 @@ class TestCharacteristics:
     def test_a_tool_is_asked_for_or_said_to_be_none(self, engineer: Person, shop: Shop) -> None:
         page = self.new(engineer, shop, unique("asked"), 422, tool_memory="").text
         assert "Enter the tool whose offset is corrected, or 0 to measure only" in errors(page)[0]
+        page = self.new(engineer, shop, unique("asked"), 422, tool_memory="", factor="").text
+        assert any("The factor is missing" in sentence for sentence in errors(page)), "both at once"
         key = unique("measures")
         self.new(engineer, shop, key, tool_memory="0", average_memory="")
         assert "It measures only" in engineer.open(f"/setup/characteristics/{key}")
         assert shop.call("GET", f"/characteristics/{key}")["parameters"]["average_memory"] == 0
+
+    def test_limits_that_follow_from_the_tolerance_are_not_asked_for(self, engineer: Person, shop: Shop) -> None:
+        left = dict.fromkeys(("zero_range", "wear_limit", "confidence_limit"), "")
+        page = self.new(engineer, shop, unique("asked"), 422, **left, upper_deviation="", lower_deviation="").text
+        assert [sentence.split(" ", 1)[0] for sentence in errors(page)] == ["R40", "R41"]
+        page = self.new(engineer, shop, unique("asked"), 422, **left, upper_deviation="0", lower_deviation="0").text
+        assert [sentence.split(" ", 1)[0] for sentence in errors(page)] == ["R40"]
 
     @pytest.mark.long
     def test_a_list_of_very_many_goes_on_on_another_page(self, engineer: Person, server: Server, shop: Shop) -> None:
