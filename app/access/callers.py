@@ -37,9 +37,10 @@ class Caller:
             return
         if self.role is None:
             raise NotAllowed(
-                _("The key of machine {machine} may only push readings and handle corrections of that machine.").format(
-                    machine=self.machine
-                ),
+                _(
+                    "The key of machine {machine} may only push readings of that machine, and handle its corrections, tools, "
+                    "averages, calibrations and pairs."
+                ).format(machine=self.machine),
                 _("Use the key or the sign-in of a person for this."),
             )
         raise NotAllowed(

@@ -26,8 +26,8 @@ DESCRIPTION = f"""\
 Lengths are millimetres, times RFC 3339 with an offset, keys are slugs (`[a-z0-9][a-z0-9._-]{{0,63}}`). What is here is kept within \
 version 1; fields may be added to answers, so skip those you do not know.
 
-A program sends its key: `Authorization: Bearer KEY`. The key of a machine pushes readings and handles corrections of that machine \
-only; other keys have a role: viewer, operator, engineer or admin, each of which may do what those before it may. A browser's \
+A program sends its key: `Authorization: Bearer KEY`. The key of a machine pushes readings and handles corrections, \
+tools, averages, calibrations and pairs of that machine only; other keys have a role: viewer, operator, engineer or admin, each of which may do what those before it may. A browser's \
 session works too; then a change carries the header `X-CSRF-Token`.
 
 Errors are `{PROBLEM_JSON}` (RFC 9457) with what is wrong, where, and what to do about it. After a 5xx nothing was stored, but for \

@@ -210,3 +210,9 @@ def test_who_may_not_hears_that_before_what_is_wrong(server: InProcess, size: in
     for how in wrong:
         assert viewer.post("/api/v1/machines", **how).status_code == 403, how
         assert engineer.post("/api/v1/machines", **how).status_code == 422, how
+
+
+def test_the_key_of_a_machine_hears_all_that_it_may_do(shop: Shop) -> None:
+    refused = shop.machine_client.post("/api/v1/machines", json={})
+    assert refused.status_code == 403
+    assert "its corrections, tools, averages, calibrations and pairs" in refused.json()["detail"]
