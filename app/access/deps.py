@@ -34,6 +34,7 @@ __all__ = [
     "Caller",
     "Engineer",
     "Operator",
+    "OperatorOrMachine",
     "Station",
     "Viewer",
     "recognise",
@@ -131,6 +132,19 @@ def require(role: Role) -> Any:
     return Depends(caller_with_role)
 
 
+def operator_or_machine(caller: AnyCaller) -> Caller:
+    """Let in the keys of machines, and nobody below the role operator. Which machine it is about, the route asks."""
+    caller.must_somewhere("operator")
+    return caller
+
+
+async def _check_operator_or_machine(request: Request) -> None:
+    (await caller_of(request)).must_somewhere("operator")
+
+
+checked_first(operator_or_machine, _check_operator_or_machine)
+
+
 class AtStation(NamedTuple):
     """A viewer of the station of a machine: a person who is signed in, or the device that is bound to it."""
 
@@ -176,5 +190,6 @@ async def get_at_station(request: Request, machine: str) -> AtStation:
 Station = Annotated[AtStation, Depends(get_at_station)]
 Viewer = Annotated[Caller, require("viewer")]
 Operator = Annotated[Caller, require("operator")]
+OperatorOrMachine = Annotated[Caller, Depends(operator_or_machine)]
 Engineer = Annotated[Caller, require("engineer")]
 Admin = Annotated[Caller, require("admin")]

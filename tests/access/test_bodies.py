@@ -216,3 +216,22 @@ def test_the_key_of_a_machine_hears_all_that_it_may_do(shop: Shop) -> None:
     refused = shop.machine_client.post("/api/v1/machines", json={})
     assert refused.status_code == 403
     assert "its corrections, tools, averages, calibrations and pairs" in refused.json()["detail"]
+
+
+@pytest.mark.parametrize(
+    ("method", "path"),
+    [
+        ("PUT", "tools/9"),
+        ("POST", "tools/9/change"),
+        ("POST", "tools/9/reported"),
+        ("PUT", "averages/5"),
+        ("POST", "faults"),
+        ("POST", "heartbeat"),
+        ("PUT", "context"),
+    ],
+)
+def test_a_viewer_hears_that_before_what_is_wrong_at_a_machine(shop: Shop, method: str, path: str) -> None:
+    viewer = shop.server.client(shop.server.key("viewer"))
+    for body in ({}, {"nonsense": 1}):
+        answer = viewer.request(method, f"/api/v1/machines/{shop.machine}/{path}", json=body)
+        assert answer.status_code == 403, answer.text

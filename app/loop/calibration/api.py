@@ -4,7 +4,7 @@ from typing import Annotated
 
 from fastapi import Path, Query, Response
 
-from app.access.deps import AnyCaller, Caller, Engineer, Operator, require
+from app.access.deps import AnyCaller, Caller, Engineer, Operator, OperatorOrMachine, require
 from app.core.parameters import MOST_LOCATIONS
 from app.loop.calibration import actions, figures, pairs, places, queries
 from app.loop.calibration.answers import (
@@ -62,7 +62,7 @@ def list_calibration_places(session: SessionDep) -> Page[PlaceOut]:
     "/machines/{machine}/calibrations", status_code=201, responses=problems(404, 409) | sent_again(CalibrationOut)
 )
 def calibrate_gauge(
-    session: SessionDep, caller: AnyCaller, machine: MachineKey, given: GaugeIn, response: Response
+    session: SessionDep, caller: OperatorOrMachine, machine: MachineKey, given: GaugeIn, response: Response
 ) -> CalibrationOut:
     """Calibrate against a gauge of known size, as L92 does; R11 is the location whose empirical value is found.
 
@@ -79,7 +79,7 @@ def calibrate_gauge(
     "/machines/{machine}/calibrations/ring", status_code=201, responses=problems(404, 409) | sent_again(CalibrationOut)
 )
 def calibrate_ring(
-    session: SessionDep, caller: AnyCaller, machine: MachineKey, given: RingIn, response: Response
+    session: SessionDep, caller: OperatorOrMachine, machine: MachineKey, given: RingIn, response: Response
 ) -> CalibrationOut:
     """Calibrate the X offset of a probe in a ring on the spindle: three sections along Z, each touched in +X and −X.
 
@@ -138,7 +138,9 @@ def accept_calibration(
 
 
 @router.post("/machines/{machine}/averages/{location}/pairs", status_code=201, responses=problems(404, 409))
-def add_pair(session: SessionDep, caller: AnyCaller, machine: MachineKey, location: R11, given: PairIn) -> PairOut:
+def add_pair(
+    session: SessionDep, caller: OperatorOrMachine, machine: MachineKey, location: R11, given: PairIn
+) -> PairOut:
     """Keep a reading of the machine beside what an external gauge (micrometer, CMM) says of the same part."""
     machine_row = machine_for(session, caller, machine, "operator")
     (row,) = pairs.add_pairs(session, machine_row, location, [given], caller)

@@ -4,7 +4,7 @@ from datetime import timedelta
 
 from fastapi import Request, Response
 
-from app.access.deps import Admin, AnyCaller
+from app.access.deps import Admin, AnyCaller, OperatorOrMachine
 from app.loop.connections import actions, queries
 from app.loop.connections.queries import ConnectionRow
 from app.loop.connections.schemas import ConnectionOut, HeartbeatIn, HeartbeatOut, ServerOut
@@ -20,7 +20,7 @@ router = api_router("connections")
 
 @router.post("/machines/{machine}/heartbeat", responses=problems(404))
 def take_heartbeat(
-    request: Request, session: DoorSessionDep, caller: AnyCaller, machine: MachineKey, heartbeat: HeartbeatIn
+    request: Request, session: DoorSessionDep, caller: OperatorOrMachine, machine: MachineKey, heartbeat: HeartbeatIn
 ) -> HeartbeatOut:
     """A bridge says, every ten seconds, that it lives and the state of this machine. The answer tells where the
     server's database stands: one that was restored or has failed over may lack readings that it had stored; and which touch

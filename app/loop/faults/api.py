@@ -5,7 +5,7 @@ from typing import Annotated
 from fastapi import Response
 from pydantic import BaseModel, Field
 
-from app.access.deps import AnyCaller
+from app.access.deps import OperatorOrMachine
 from app.loop.faults import actions
 from app.loop.faults.alarm_kinds import Fault
 from app.web.api import MachineKey, api_router, problems
@@ -34,7 +34,7 @@ class FaultOut(BaseModel):
 
 @router.post("/machines/{machine}/faults", status_code=201, responses=problems(404) | {200: {"model": FaultOut}})
 def report_fault(
-    session: DoorSessionDep, caller: AnyCaller, machine: MachineKey, fault: FaultIn, response: Response
+    session: DoorSessionDep, caller: OperatorOrMachine, machine: MachineKey, fault: FaultIn, response: Response
 ) -> FaultOut:
     """Report a fault of the machine (battery of the probe low, receiver, probe not ready) or its end: the alarm
     *machine fault* is raised, counts up or ends. 201 for a new alarm, else 200.

@@ -1,6 +1,6 @@
 """JSON routes: what a machine works at."""
 
-from app.access.deps import AnyCaller
+from app.access.deps import AnyCaller, OperatorOrMachine
 from app.loop.machines.queries import hold_machine, machine_for
 from app.loop.present_context import actions
 from app.loop.present_context.queries import present_of
@@ -23,7 +23,7 @@ def get_present_context(session: SessionDep, caller: AnyCaller, machine: Machine
 @router.put("/machines/{machine}/context", responses=problems(404, 412))
 @guarded(get_present_context, hold_machine)
 def set_present_context(
-    session: SessionDep, caller: AnyCaller, machine: MachineKey, given: PresentContextIn
+    session: SessionDep, caller: OperatorOrMachine, machine: MachineKey, given: PresentContextIn
 ) -> PresentContextOut:
     """Say what the machine works at from now on; `{}`: nothing is known. Readings that were measured before keep what they have.
 

@@ -4,7 +4,7 @@ from typing import Annotated
 
 from fastapi import Path, Query, Response
 
-from app.access.deps import AnyCaller, Operator
+from app.access.deps import AnyCaller, Operator, OperatorOrMachine
 from app.core.parameters import MOST_LOCATIONS
 from app.core.plausibility import empirical_value_warnings, offset_warnings
 from app.loop.machines.queries import hold_machine, machine_for, machine_named
@@ -75,7 +75,9 @@ def get_tool(session: DoorSessionDep, caller: AnyCaller, machine: MachineKey, to
 
 @router.put("/machines/{machine}/tools/{tool}", responses=problems(404, 412))
 @guarded(get_tool, hold_machine)
-def edit_tool(session: SessionDep, caller: AnyCaller, machine: MachineKey, tool: R10, edit: ToolEdit) -> ToolSet:
+def edit_tool(
+    session: SessionDep, caller: OperatorOrMachine, machine: MachineKey, tool: R10, edit: ToolEdit
+) -> ToolSet:
     """Say what the offset was set to by hand.
 
     Corrections that are still open were computed for the offset before: they are superseded. The running averages of the
@@ -89,7 +91,9 @@ def edit_tool(session: SessionDep, caller: AnyCaller, machine: MachineKey, tool:
 
 
 @router.post("/machines/{machine}/tools/{tool}/change", responses=problems(404))
-def change_tool(session: SessionDep, caller: AnyCaller, machine: MachineKey, tool: R10, change: ToolChange) -> ToolSet:
+def change_tool(
+    session: SessionDep, caller: OperatorOrMachine, machine: MachineKey, tool: R10, change: ToolChange
+) -> ToolSet:
     """Say that the tool was changed.
 
     As a manual edit; besides, its parts and the sum of its corrections begin again at 0. Alarms about the old tool stay
@@ -102,7 +106,7 @@ def change_tool(session: SessionDep, caller: AnyCaller, machine: MachineKey, too
 
 @router.post("/machines/{machine}/tools/{tool}/reported", responses=problems(404))
 def report_offset(
-    session: DoorSessionDep, caller: AnyCaller, machine: MachineKey, tool: R10, report: OffsetReportIn
+    session: DoorSessionDep, caller: OperatorOrMachine, machine: MachineKey, tool: R10, report: OffsetReportIn
 ) -> OffsetReportOut:
     """Say what offset the control holds, without confirming a correction.
 
@@ -172,7 +176,7 @@ def get_average(session: SessionDep, caller: AnyCaller, machine: MachineKey, loc
 @router.put("/machines/{machine}/averages/{location}", responses=problems(404, 412))
 @guarded(get_average, hold_machine)
 def set_empirical_value(
-    session: SessionDep, caller: AnyCaller, machine: MachineKey, location: R11, value: EmpiricalValueIn
+    session: SessionDep, caller: OperatorOrMachine, machine: MachineKey, location: R11, value: EmpiricalValueIn
 ) -> AverageSet:
     """Set the empirical value; the running average begins again at 0."""
     machine_row = machine_for(session, caller, machine, "operator")

@@ -5,7 +5,7 @@ from typing import Annotated
 from fastapi import Query
 from fastapi.responses import PlainTextResponse
 
-from app.access.deps import AnyCaller
+from app.access.deps import AnyCaller, OperatorOrMachine
 from app.core.parameters import Axis
 from app.core.programs.correction_forms import Form
 from app.core.programs.corrections import PendingCorrection, steps, write
@@ -59,7 +59,7 @@ def corrections_file(machine: str, control: str) -> str:
 
 
 @router.post("/machines/{machine}/corrections/fetched", responses=problems(404, 409))
-def mark_fetched(session: SessionDep, caller: AnyCaller, machine: MachineKey, fetched: FetchedIn) -> FetchedOut:
+def mark_fetched(session: SessionDep, caller: OperatorOrMachine, machine: MachineKey, fetched: FetchedIn) -> FetchedOut:
     """Say that these corrections were fetched as program text. They stay pending until they are confirmed.
 
     Marking twice is harmless: the answer says who fetched first. All of them are marked, or none.
@@ -70,7 +70,7 @@ def mark_fetched(session: SessionDep, caller: AnyCaller, machine: MachineKey, fe
 
 @router.post("/machines/{machine}/corrections/applied", responses=problems(404))
 def confirm_corrections(
-    session: SessionDep, caller: AnyCaller, machine: MachineKey, confirmed: ConfirmedIn
+    session: SessionDep, caller: OperatorOrMachine, machine: MachineKey, confirmed: ConfirmedIn
 ) -> ConfirmedOut:
     """Confirm that these corrections are in the control, all at once. Confirming twice is harmless.
 

@@ -5,7 +5,7 @@ from typing import Annotated
 
 from fastapi import Path, Request, Response
 
-from app.access.deps import AnyCaller, Operator
+from app.access.deps import AnyCaller, Operator, OperatorOrMachine
 from app.loop.connections.touch_tests import actions, queries
 from app.loop.connections.touch_tests.schemas import TouchTestAnswer, TouchTestIn, TouchTestOut, TouchTestReport
 from app.loop.machines.queries import machine_for
@@ -63,7 +63,7 @@ def stop_touch_test(session: SessionDep, caller: Operator, machine: MachineKey, 
 
 @router.post(TESTS + "/{number}/report", responses=problems(404, 409))
 def report_touch_test(
-    session: SessionDep, caller: AnyCaller, machine: MachineKey, number: Number, report: TouchTestReport
+    session: SessionDep, caller: OperatorOrMachine, machine: MachineKey, number: Number, report: TouchTestReport
 ) -> TouchTestOut:
     """The bridge says how far it has come; the answer is the test as it is, with what people have answered meanwhile."""
     return TouchTestOut.of(actions.report(session, machine, number, report, caller))
