@@ -10,8 +10,7 @@
 //
 // Its x axis is zoomed and moved (chart-gestures.js, chart-strip.js), unless the figure says fixedrange, dragmode false, ties
 // its axes together or names categories. A point with a link is selected by a click (chart-cursor.js).
-// plotly.js is loaded when the first chart comes near the window. If fetching fails, the chart stays and says in words that
-// it is old, and how old.
+// plotly.js is loaded when the first chart comes near the window. If fetching fails, the chart stays and says how old it is.
 
 import { ChartCursor } from "./chart-cursor.js";
 import { withoutCrowded } from "./chart-details.js";
