@@ -54,6 +54,7 @@ _OTHER_SCALES: Final = {"f", "fahrenheit", "k", "kelvin", "r", "rankine", "℉"}
 _WORDS_OF: Final = re.compile(r"[^\W\d_]+")
 _UNMISTAKABLE: Final = frozenset(
     ["mm", "µm", "inch", "inches", "zoll", "micron", "microns", "thou", "thous", "дюйм", "мм", "мкм"]
+    + ["microinch", "microinches", "uinch", "µinch", "millimeter", "millimetre"]
 )
 """Words that mean a unit wherever they stand in a name. Others do at its end only: *um* is a German word, *in* an English one."""
 _AT_END: Final = re.compile(r"(?:[_,;/ ]|(?<=\d))(mm|MM|[uµμ]m|nm|cm|mils?|tenths?|[uµμ]in)$", re.IGNORECASE)
@@ -152,8 +153,8 @@ def unit_in(header: str) -> str | None:
 
     >>> unit_in("Wert [µm]"), unit_in("размер (мкм)"), unit_in("D40_mm"), unit_in("D (X)"), unit_in("measured")
     ('um', 'um', 'mm', None, None)
-    >>> unit_in("D40 inches"), unit_in("boreInches"), unit_in("width, mil"), unit_in('D 1.5"'), unit_in("D1 [X]"), unit_in("in feed")
-    ('inch', 'inch', 'mil', 'inch', None, None)
+    >>> unit_in("D40 inches"), unit_in("Ra microinch"), unit_in("width, mil"), unit_in('D 1.5"'), unit_in("D1 [X]"), unit_in("in feed")
+    ('inch', 'uin', 'mil', 'inch', None, None)
     >>> unit_in("Run-out [furlong]")
     Traceback (most recent call last):
         ...

@@ -49,6 +49,7 @@ LENGTHS = {
     "16": D40 | {"target": 16.0},
     "2.167": D40 | {"target": 2.167},
     "0": D40 | {"target": 0.0},
+    "1.016": D40 | {"target": 1.016},
 }
 MORNING = "2025-11-18T05:0{}:00"
 Readings = list[tuple[float, str | None]]
@@ -197,6 +198,9 @@ TABLES = {
     "in that may be inches": Case(THREE.replace("D40", "Bore in"), words="in", whole=True, column="Bore in"),
     "feet": Case(THREE.replace("D40", "D40_ft"), words="ft", whole=True, column="D40_ft"),
     "a tolerance in the name": Case(THREE.replace("D40", "Bore 5 µm"), words="5 µm", whole=True, column="Bore 5 µm"),
+    "microinches": Case(
+        "Time,D microinch\n2025-11-18 06:05,40000\n", [(1.016, MORNING.format(5))], size="1.016", column="D microinch"
+    ),
     "inches in one word": Case("Time,boreInches\n2025-11-18 06:05,1.57480\n", morning(39.99992), column="boreInches"),
     "nominal as a row": Case(
         "Time;Part;D40\n;Nominal;40\n18.11.2025 06:05;P1;40,001\n;USL;40,008\n", bad=(2, 4), words="statistics"
