@@ -115,7 +115,9 @@ def labels_of(fields: Mapping[str, Any], row: Mapping[str, Any]) -> list[Any]:
     """The cells of a row that name its part, or would in any other row: the first one, and those of part and time."""
     first = next((value for value in row.values() if value is not None and str(value).strip()), None)
     sizes = (fields.get("measured"), fields.get("characteristic"))
-    return [fields.get("part"), fields.get("measured_at"), None if first in sizes else first]
+    named = [fields.get("part"), fields.get("measured_at")]
+    a_shift = any(named) and len(str(first).strip()) == 1 and first not in named  # S and N are shifts as well
+    return named if first in sizes or a_shift else [*named, first]
 
 
 def parts_of(column: str, names: Collection[str]) -> list[str]:

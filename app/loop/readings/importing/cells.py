@@ -202,8 +202,11 @@ def _labels(cells: Sequence[str], layout: Layout) -> list[str]:
     """The cells of a row that name its part, or would in any other row: the first one, and those of part and time."""
     sizes = {place for name in ("measured", "characteristic") for place in layout.columns.get(name, ())}
     first = next((place for place, cell in enumerate(cells) if cell.strip()), 0)
-    places = {first, *layout.columns.get("part", ()), *layout.columns.get("measured_at", ())} - sizes
-    return [cells[place].strip() for place in places]
+    of_part = {*layout.columns.get("part", ()), *layout.columns.get("measured_at", ())} - sizes
+    named = [cells[place].strip() for place in of_part]
+    if first in sizes | of_part or (any(named) and len(cells[first].strip()) == 1):
+        return named  # S and N are shifts as well
+    return [*named, cells[first].strip()]
 
 
 def _stranger(line: int, cells: Sequence[Any], layouts: Sequence[Layout]) -> Passed | None:

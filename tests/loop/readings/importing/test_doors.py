@@ -202,6 +202,12 @@ TABLES = {
         "Time,D microinch\n2025-11-18 06:05,40000\n", [(1.016, MORNING.format(5))], size="1.016", column="D microinch"
     ),
     "inches in one word": Case("Time,boreInches\n2025-11-18 06:05,1.57480\n", morning(39.99992), column="boreInches"),
+    "shifts S and N": Case(
+        "Shift;Time;Part;D40\nS;18.11.2025 06:05;P1;40,001\nN;18.11.2025 06:06;P2;40,002\n", morning(40.001, 40.002)
+    ),
+    "a row of s and n": Case(
+        "What;Time;Part;D40\nF;18.11.2025 06:05;P1;40,001\ns;;;0,001\n", bad=(3,), words="statistics"
+    ),
     "nominal as a row": Case(
         "Time;Part;D40\n;Nominal;40\n18.11.2025 06:05;P1;40,001\n;USL;40,008\n", bad=(2, 4), words="statistics"
     ),
