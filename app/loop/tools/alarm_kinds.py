@@ -12,6 +12,13 @@ from app.loop.tables.tools import OPPOSITE
 
 
 def _differs(alarm: Alarm) -> str:
+    if alarm.data.get("assumed"):
+        return _(
+            "The machine holds {reported} in tool {tool}; {expected} was expected. No offset of this tool was entered before, and 0 "
+            "was assumed. Which offset does the control hold? Nothing is corrected through this tool until that is said."
+        ).format(
+            reported=mm(alarm.data.get("reported")), expected=mm(alarm.data.get("expected")), tool=alarm.tool_memory
+        )
     if alarm.data.get("correction") is None:
         return _(
             "The machine holds {reported} in tool {tool}; {expected} was expected. Who changed it at the control, and why? "
@@ -88,6 +95,7 @@ OFFSET_DIFFERS = register(
         actions=("offset_set", "tool_replaced"),
         comments={
             "offset_set": lambda: [
+                _("First offset of this tool"),
                 _("Part measured by hand"),
                 _("Tool was changed"),
                 _("Typed in by mistake"),

@@ -9,6 +9,7 @@ from collections.abc import Sequence
 from datetime import UTC, datetime
 from typing import NamedTuple
 
+from sqlalchemy import or_, select
 from sqlalchemy.orm import Session
 
 from app.access.callers import Caller
@@ -138,7 +139,8 @@ def _reported(
     if not _differs(tool.offset, expected):
         publish(session, *changes)
         return Decided(first)
-    alarm, fallen = _pause(session, machine, tool, expected, first.number)
+    assumed = _is_assumed(session, machine, tool, [applied.number for applied in confirmed])
+    alarm, fallen = _pause(session, machine, tool, expected, first.number, assumed=assumed)
     changes += [correction_changed(session, machine, superseded) for superseded in fallen]
     publish(session, *changes, alarm_raised(machine, alarm))
     return Decided(
@@ -147,9 +149,12 @@ def _reported(
 
 
 def _pause(
-    session: Session, machine: Machine, tool: Tool, expected: float, correction: int | None
+    session: Session, machine: Machine, tool: Tool, expected: float, correction: int | None, *, assumed: bool
 ) -> tuple[Alarm, Sequence[Correction]]:
-    """Nothing is corrected through this tool until a person has said which offset is true: the alarm, and what fell."""
+    """Nothing is corrected through this tool until a person has said which offset is true: the alarm, and what fell.
+
+    assumed: the offset before was never entered, so nobody need have changed it.
+    """
     alarm = alarms.raise_for_tool(
         session,
         machine.id,
@@ -160,6 +165,7 @@ def _pause(
             "expected": expected,
             "reported": tool.offset,
             "limit": OFFSET_TOLERANCE / 1e6,
+            "assumed": assumed,
         },
     )
     tool.paused_by = alarm.id
@@ -203,9 +209,10 @@ def report_offset(
     expected = (
         tool.offset if asked is None else asked.data.get("expected", tool.offset)
     )  # a second report: still of the first question
+    assumed = _is_assumed(session, machine, tool) if asked is None else bool(asked.data.get("assumed"))
     before, tool.offset = tool.offset, rounded(offset)
     _step(session, machine, tool, None, before, tool.offset, datetime.now(UTC), caller)
-    alarm, fallen = _pause(session, machine, tool, expected, None)
+    alarm, fallen = _pause(session, machine, tool, expected, None, assumed=assumed)
     publish(
         session,
         tool_changed(machine, tool.number),
@@ -215,6 +222,16 @@ def report_offset(
     numbers = [superseded.number for superseded in fallen]
     note = wording.offset_differs(alarm.id, expected, tool.offset, numbers)
     return Report(tool, differs=True, superseded=numbers, note=note)
+
+
+def _is_assumed(session: Session, machine: Machine, tool: Tool, confirmed: Sequence[int] = ()) -> bool:
+    """Tell if the offset was 0 by assumption before these corrections: the history of the tool holds no other step."""
+    other = select(ToolEvent.id).where(
+        ToolEvent.machine_id == machine.id,
+        ToolEvent.number == tool.number,
+        or_(ToolEvent.correction.is_(None), ToolEvent.correction.not_in(confirmed)),
+    )
+    return session.scalar(other.limit(1)) is None
 
 
 def _step(

@@ -37,7 +37,7 @@ def offset_figure(changes: Sequence[OffsetChange]) -> Chart:
         "correction": _("Correction"),
         "edit": _("Manual edit"),
         "change": _("Tool changed"),
-        "reported": _("Reported by the machine"),
+        "reported": _("Reported offset"),
     }
     course = Pen("correction", 2, steps="hv")
     marks: list[Mark] = [Rule(Pen("faint", 1.25, "dot"), x=change.at) for change in changes if change.kind == "change"]

@@ -212,7 +212,7 @@ def event_word(kind: str) -> str:
         "change": _("Tool changed"),
         "edit": _("Manual edit"),
         "correction": _("Correction"),
-        "reported": _("Reported by the machine"),
+        "reported": _("Reported offset"),
     }.get(kind, kind)
 
 

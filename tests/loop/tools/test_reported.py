@@ -52,6 +52,26 @@ def test_an_edit_that_hits_a_pending_offset_is_seen_by_who_knows_better(shop: Sh
     assert (answer["differs"], answer["superseded"]) == (True, [number])
 
 
+def test_of_an_offset_that_was_only_assumed_nobody_is_asked_who_changed_it(shop: Shop) -> None:
+    report(shop, 0.05)
+    assert "No offset of this tool was entered before, and 0 was assumed" in questions(shop)[0]["text"]
+    report(shop, 0.06)
+    assert "was assumed" in questions(shop)[0]["text"], "still the first question"
+    shop.acknowledge(questions(shop)[0]["id"], "offset_set", offset=0.06, changed_by="Ana")
+    report(shop, 0.07)
+    assert "Who changed it at the control" in questions(shop)[0]["text"]
+
+
+def test_nor_with_the_first_correction(shop: Shop) -> None:
+    shop.correction(pending(shop), "applied", offset_after=-0.1061)
+    (asked,) = questions(shop)
+    assert "was assumed" in asked["text"]
+    assert shop.tool()["paused_by"] == asked["id"]
+    shop.acknowledge(asked["id"], "offset_set", offset=-0.1061, changed_by="Ana")
+    shop.correction(pending(shop), "applied", offset_after=0.5)
+    assert "Who changed it at the control" in questions(shop)[0]["text"]
+
+
 def test_pending_corrections_may_explain_it(shop: Shop) -> None:
     first, second = pending(shop, 20), pending(shop, 50)
     expected = shop.correction(second)["offset_expected"]
@@ -69,7 +89,7 @@ def test_pending_corrections_may_explain_it(shop: Shop) -> None:
 def test_the_step_stands_in_the_history_of_the_tool(shop: Shop, server: Any) -> None:
     report(shop, 0.05)
     page = Person(server, "viewer").open(f"/machines/{shop.machine}/tools?tool=3")
-    assert "Reported by the machine" in page
+    assert "Reported offset" in page
 
 
 def test_who_may_not_and_what_is_no_offset_are_refused(shop: Shop, server: Any) -> None:

@@ -45,7 +45,7 @@ def reported_otherwise(shop: Shop) -> Any:
 class TestOffsetDiffers:
     def test_nothing_is_corrected_until_somebody_has_said_which_is_true(self, shop: Shop) -> None:
         alarm = reported_otherwise(shop)
-        assert "Who changed it" in alarm["text"]
+        assert "No offset of this tool was entered before" in alarm["text"]
         assert shop.tool()["paused_by"] == alarm["id"]
         answer = shop.read(20.0)
         assert (answer["action"], answer["correction"], answer["reason"]["code"]) == ("none", None, "paused")
