@@ -79,6 +79,8 @@ async def send_sign_in(request: Request, form: FormDep, settings: SettingsDep) -
 async def elsewhere(path: str) -> Response:
     """Lead every other address to the overview, there being no plant at the root. Raises `NotFound` for programs."""
     if is_for_programs(f"/{path}"):
+        if path.startswith("p/"):
+            raise NotFound(_("There is no plant {key} on this server.").format(key=repr(path.split("/")[1][:64])))
         raise NotFound(
             _("There is no plant at the root of this server."),
             _("Write the plant before the path: /p/PLANT/{path}.").format(path=path),

@@ -52,7 +52,12 @@ NO_ROOM = "53100"
 
 
 def is_for_programs(path: str) -> bool:
-    """Tell if a program reads answers from this path."""
+    """Tell if a program reads answers from this path, or from this one below a plant.
+
+    >>> is_for_programs("/api/v1/machines"), is_for_programs("/p/none/api/v1/machines"), is_for_programs("/p/none/machines")
+    (True, True, False)
+    """
+    path = re.sub(r"\A/p/[^/]*", "", path)
     return path.startswith(FOR_PROGRAMS) or path == "/api"
 
 

@@ -260,6 +260,8 @@ def test_without_a_plant_at_the_root_everything_leads_to_the_overview(
         refused = get(f"{server.url}/api/v1/machines")
         assert (refused.status_code, "/p/PLANT/api/v1/machines" in refused.text) == (404, True)
         assert get(f"{server.url}/p/only").headers["location"] == "/p/only/"
+        refused = get(f"{server.url}/p/nope/api/v1/machines")
+        assert (refused.status_code, "There is no plant 'nope'" in refused.json()["detail"]) == (404, True)
         assert migrate.current(url) is None
     drop_database(url)
 

@@ -85,6 +85,9 @@ class TestQueries:
         refused(shop.admin.get("/api/v1/alarms?state=active&status=all"), 422)
         assert shop.admin.get(f"{corrections}?state=pending&status=held").status_code == 200
 
+    def test_a_plant_that_is_not_there_answers_programs_too(self, shop: Shop) -> None:
+        refused(shop.admin.get("/p/nope/api/v1/machines"), 404)
+
     def test_without_credentials_nobody_learns_of_parameters(self, shop: Shop) -> None:
         with httpx.Client(base_url=shop.admin.base_url, timeout=60) as nobody:
             refused(nobody.get("/api/v1/readings?limitt=1"), 401)
