@@ -198,7 +198,7 @@ def _keep(limits: Limits) -> None:
         import resource
     except ModuleNotFoundError:  # Windows: the clock of the server is the only limit
         return
-    os.nice(10)  # a tenth of a processor that is wanted elsewhere: readings go first
+    os.nice(5)
     for kind, most in (
         (resource.RLIMIT_CPU, limits.seconds),
         (resource.RLIMIT_DATA, limits.memory),
