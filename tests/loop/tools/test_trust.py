@@ -238,7 +238,6 @@ class TestPlausibility:
         assert first["action"] == "correct"
         path = f"/readings/{guarded.characteristic}/{first['sequence']}/exclude"
         guarded.call("POST", path, 200, reason="chip")
-        guarded.correction(first["correction"]["number"], "rejected", reason="chip")
         assert guarded.read(0.5)["reason"]["code"] == "within_zero_range"
 
     def test_a_new_target_or_empirical_value_is_no_jump(self, guarded: Shop) -> None:
