@@ -125,7 +125,7 @@ class TestWithoutScripts:
         text = operator.open(f"/alarms?machine={shop.machine}")
         assert set(kinds(text)) == {"Oversize", "Undersize", "Offset limit", "Offset differs", "Probe fault"}
         assert "have come to their limit ±10" in text
-        assert "the machine holds 0.5000" in text
+        assert "The machine holds 0.5000" in text
 
 
 @pytest.mark.browser
