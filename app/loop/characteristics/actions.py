@@ -27,7 +27,8 @@ from app.db.events import publish
 from app.errors import Conflict, FieldError, Invalid
 from app.language.i18n import _
 from app.loop.characteristics import form_actions, queries, wording
-from app.loop.characteristics.corrections import correction_changed, open_corrections, supersede
+from app.loop.characteristics.correction_actions import supersede
+from app.loop.characteristics.correction_queries import correction_changed, open_corrections
 from app.loop.characteristics.form_actions import parameters_of_form, refused_for_form
 from app.loop.characteristics.queries import CurrentCharacteristic
 from app.loop.characteristics.schemas import CharacteristicChange, CharacteristicIn, warnings_of

@@ -5,7 +5,7 @@ from typing import Annotated
 from fastapi import Query, Response
 
 from app.access.deps import AnyCaller, Engineer
-from app.loop.characteristics import actions, corrections, queries
+from app.loop.characteristics import actions, correction_queries, queries
 from app.loop.characteristics.schemas import (
     CharacteristicChange,
     CharacteristicIn,
@@ -66,7 +66,7 @@ def change_characteristic(
     characteristic are superseded; a warning names them.
     """
     current = actions.change_characteristic(session, characteristic, change, caller.name)
-    fallen = corrections.superseded_with(session, current) if change.parameters else ()
+    fallen = correction_queries.superseded_with(session, current) if change.parameters else ()
     return characteristic_out(current, queries.target_before(session, current), change.parameters, fallen)
 
 

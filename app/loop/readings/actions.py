@@ -12,7 +12,7 @@ from app.db.events import publish
 from app.errors import Conflict
 from app.language.i18n import _
 from app.language.times import in_sentence
-from app.loop.characteristics.corrections import correction_changed
+from app.loop.characteristics.correction_queries import correction_changed
 from app.loop.machines.queries import lock_machines
 from app.loop.readings import queries
 from app.loop.readings.records import Entry

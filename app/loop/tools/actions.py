@@ -19,7 +19,8 @@ from app.db.events import publish
 from app.errors import Conflict
 from app.language.i18n import _
 from app.loop.alarms.reading_kinds import TOOL_WORN
-from app.loop.characteristics.corrections import correction_changed, open_corrections, supersede
+from app.loop.characteristics.correction_actions import supersede
+from app.loop.characteristics.correction_queries import correction_changed, open_corrections
 from app.loop.characteristics.queries import parts_cut
 from app.loop.machines.queries import lock_machines
 from app.loop.readings import queries as reading_queries

@@ -19,7 +19,8 @@ from app.db.events import publish
 from app.errors import Conflict
 from app.language.i18n import _
 from app.loop.alarms import actions as alarms
-from app.loop.characteristics.corrections import correction_changed, open_corrections, supersede
+from app.loop.characteristics.correction_actions import supersede
+from app.loop.characteristics.correction_queries import correction_changed, open_corrections
 from app.loop.machines.queries import lock_machines
 from app.loop.tables.alarms import Alarm
 from app.loop.tables.machines import Machine

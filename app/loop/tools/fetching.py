@@ -27,7 +27,7 @@ from app.core.programs.corrections import (
 from app.db.events import publish
 from app.errors import Conflict, Invalid
 from app.language.i18n import _
-from app.loop.characteristics.corrections import correction_changed
+from app.loop.characteristics.correction_queries import correction_changed
 from app.loop.machines.queries import lock_machines
 from app.loop.tables.characteristics import ParametersVersion
 from app.loop.tables.machines import Machine

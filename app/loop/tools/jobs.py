@@ -11,7 +11,7 @@ from app.core.tool_life import LifeUse, use_of
 from app.db.events import publish
 from app.jobs.actions import PeriodicJob, Unit
 from app.loop.alarms import actions as alarms
-from app.loop.characteristics.corrections import correction_changed
+from app.loop.characteristics.correction_queries import correction_changed
 from app.loop.machines.queries import lock_machines
 from app.loop.tables.machines import Machine
 from app.loop.tables.readings import Stream

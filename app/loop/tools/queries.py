@@ -12,7 +12,7 @@ from app.core.decision.step import rounded
 from app.core.parameters import MOST_LOCATIONS
 from app.errors import NotFound
 from app.language.i18n import _
-from app.loop.characteristics.corrections import open_corrections
+from app.loop.characteristics.correction_queries import open_corrections
 from app.loop.readings import queries as readings
 from app.loop.tables.characteristics import Characteristic
 from app.loop.tables.machines import Machine

@@ -17,7 +17,8 @@ from app.errors import Conflict
 from app.language.i18n import _
 from app.loop.characteristics import actions as characteristics
 from app.loop.characteristics.actions import CharacteristicChange
-from app.loop.characteristics.corrections import correction_changed, open_corrections, supersede
+from app.loop.characteristics.correction_actions import supersede
+from app.loop.characteristics.correction_queries import correction_changed, open_corrections
 from app.loop.machines.queries import lock_machines
 from app.loop.tables.characteristics import Characteristic
 from app.loop.tables.machines import Machine

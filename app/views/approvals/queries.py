@@ -10,7 +10,7 @@ from app.core.decision.step import rounded
 from app.core.parameters import Parameters
 from app.loop.alarms.reading_kinds import HOLDING
 from app.loop.characteristics import queries as characteristics
-from app.loop.characteristics.corrections import open_corrections
+from app.loop.characteristics.correction_queries import open_corrections
 from app.loop.machines import keys
 from app.loop.machines import queries as machines
 from app.loop.tables.alarms import Alarm

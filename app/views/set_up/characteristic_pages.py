@@ -20,7 +20,7 @@ from app.errors import Conflict, InbandError, Invalid
 from app.language.i18n import _
 from app.loop.characteristics import actions, queries
 from app.loop.characteristics.actions import CharacteristicChange, CharacteristicIn
-from app.loop.characteristics.corrections import superseded_with
+from app.loop.characteristics.correction_queries import superseded_with
 from app.loop.characteristics.wording import history, result_label
 from app.loop.machines import queries as machines
 from app.loop.programs import queries as programs

@@ -1,7 +1,6 @@
-"""Open corrections: superseded where the offset or the parameters that they were computed for no longer hold."""
+"""Open corrections, and those that fell with a change of parameters. Never writes."""
 
 from collections.abc import Sequence
-from datetime import datetime
 from typing import Any
 
 from sqlalchemy import select
@@ -23,17 +22,6 @@ def open_corrections(
     if characteristic is not None:
         query = query.where(Correction.characteristic_id == characteristic.id)
     return session.scalars(query.order_by(Correction.number).execution_options(populate_existing=True)).all()
-
-
-def supersede(
-    session: Session, corrections: Sequence[Correction], now: datetime, who: str | None, reason: str
-) -> Sequence[Correction]:
-    """Supersede these corrections. who: None for the program, whose reason is then a code of `app.loop.tools.wording`."""
-    for correction in corrections:
-        correction.status, correction.reason = "superseded", reason
-        correction.decided_at, correction.decided_by = now, who
-    session.flush()
-    return corrections
 
 
 def superseded_with(session: Session, current: CurrentCharacteristic) -> list[int]:
