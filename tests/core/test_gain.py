@@ -111,7 +111,7 @@ def lives(count: int, seed: int, *, wrong: float | None = None, known: int = 30)
     return found
 
 
-@runs(2_000, 100_000)
+@runs(1_000, 100_000)
 def test_no_tool_whose_corrections_act_is_ever_paused(runs: int) -> None:
     assert [outcome for _sigma, outcome, _sizes in lives(runs, 7) if outcome >= 0] == []
 
