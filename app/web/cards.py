@@ -7,7 +7,7 @@ from markupsafe import Markup, escape
 
 _TAG = re.compile(r"""<(/?)(table|tr|td|th)\b((?:[^<>"']|"[^"]*"|'[^']*')*)>""")
 _WIDE = re.compile(r'\bcolspan="(\d+)"')
-_WORDLESS = re.compile(r"<(?!svg|img|input|select|button|textarea|plotly)[^>]*>")
+_WORDLESS = re.compile(r"<(?!svg|img|input|select|button|textarea|plotly)[^<>]*>")
 
 Head = str | tuple[str | None, ...] | None
 
