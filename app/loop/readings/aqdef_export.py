@@ -41,6 +41,8 @@ IN_EFFECT, NUMBER = "offset in effect, mm", "correction in effect"
 GUID = "K0097"
 PROCESS = (IN_EFFECT, NUMBER, EMPIRICAL)
 """K0011: the location's offset where it is known, the last correction in effect, and what was taken off the measured size."""
+NO_SIZE = {Code.TOUCH_FAULT, Code.FIRST_MOVE_TRIGGERED}
+"""Readings whose touches cannot be believed: what stands as their size was not measured."""
 OF_THE_READING = {"K0001", "K0002", "K0004", "K0014", "K0053", GUID}
 """Fields that the reading itself fills. One that a sender put beside it would be another value, or another time or part."""
 
@@ -153,7 +155,7 @@ def _values(session: Session, of: _Of, *, period: Period, last: int | None) -> I
 def _validity(row: dict[str, Any], as_it_came: str) -> int:
     """K0002: of an excluded reading the one that it came with, if any; touches that cannot be believed are no good value."""
     if row["excluded"] is None:
-        return Validity.IMPLAUSIBLE if row["code"] == Code.TOUCH_FAULT else Validity.GOOD
+        return Validity.IMPLAUSIBLE if row["code"] in NO_SIZE else Validity.GOOD
     if as_it_came.isascii() and as_it_came.isdigit():
         return int(as_it_came)
     return Validity.IMPLAUSIBLE if row["zone"] == Zone.PROBE_FAULT else Validity.INVALID

@@ -267,7 +267,7 @@ def _of_row(row: Row, layout: Layout, readers: Sequence["_Reader"]) -> Iterator[
 
 def _unfit(code: Any, excluded: Any) -> str | None:
     """The reason for which a reading that Inband wrote counted for nothing there; None for any other."""
-    if code == "touch_fault":
+    if code in {"touch_fault", "first_move_triggered"}:
         return _("its touches could not be believed where it was exported")
     return _("was excluded where it was exported") if excluded else None
 

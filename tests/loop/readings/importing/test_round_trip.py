@@ -143,12 +143,13 @@ def test_what_counted_for_nothing_does_not_count_elsewhere(database: Database, t
     with database.begin() as session:
         entry = queries.entry_of(session, D40)
     assert entry is not None
-    at = [datetime(2026, 3, 2, 5, minute, tzinfo=UTC) for minute in range(4)]
+    at = [datetime(2026, 3, 2, 5, minute, tzinfo=UTC) for minute in range(5)]
     pushed = [
         ReadingIn(D40, measured=39.991, measured_at=at[0]),
         ReadingIn(D40, touches=[[None]], measured_at=at[1]),
         ReadingIn(D40, measured=39.998, measured_at=at[2]),
         ReadingIn(D40, measured=39.993, measured_at=at[3]),
+        ReadingIn(D40, first_move_triggered=True, measured_at=at[4]),
     ]
     in_thread(lambda: store_batch(database, {}, [(entry, each) for each in pushed]))
     with database.begin() as session:
