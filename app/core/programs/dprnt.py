@@ -17,16 +17,23 @@ REGISTERS: Final = FIRST_STORED + SLOTS * SIZE
 LOWEST: Final = 500
 HIGHEST: Final = 999
 """Variables that outlast the power."""
+OF_TEXTS: Final = range(598, 604)
+"""Variables of the texts of corrections and work offsets."""
 _LOCALS: Final = {"E": 12, "N": 4, "C": 5, "I": 7, "P": 8, "T": 9, "S": 10, "U": 13}
 
 
 def dprnt_programs(first_register: int = 700, first_program: int = 9825) -> str:
     """The three programs as one text.
 
-    Raises `ValueError` where the variables do not outlast the power, or the number is none of a program.
+    Raises `ValueError` where the variables do not outlast the power or belong to other texts, or the number is none of a program.
     """
     if not LOWEST <= first_register <= HIGHEST - REGISTERS + 1:
         raise ValueError(f"The first variable is {LOWEST} to {HIGHEST - REGISTERS + 1}, not {first_register}.")
+    if first_register < OF_TEXTS.stop and first_register + REGISTERS > OF_TEXTS.start:
+        raise ValueError(
+            f"{REGISTERS} variables from {first_register} on must leave {OF_TEXTS.start} to {OF_TEXTS.stop - 1} free: "
+            "the texts of corrections and work offsets use them."
+        )
     if not 1 <= first_program <= 9997:
         raise ValueError(f"The first program is 1 to 9997, not {first_program}.")
     reading, again, line = (f"{first_program + at:04}" for at in range(3))

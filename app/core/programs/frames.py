@@ -139,7 +139,12 @@ def _fanuc_zero(zero: ZeroText) -> Iterator[str]:
 
 # --- the offset before, kept and restored
 
-_KEPT = {"X": 1, "Y": 2, "Z": 3}  # R91 to R93, #801 to #803 as the printed macro has them
+_KEPT = {"X": 1, "Y": 2, "Z": 3}  # R91 to R93, and behind KEPT_MARK on a Fanuc
+KEPT_MARK = 600
+"""The variable of a Fanuc that holds the number of the text whose old offset the three behind it keep.
+
+The ring programs have #700 to #899 on a Fanuc, and on a Haas #10800 to #10999, which are its #800 to #999 as well.
+"""
 _TURNED = {"X": 95, "Y": 96, "Z": 94}  # R parameters that keep the rotation
 WORK_ZERO, ALIGNMENT = "WORK ZERO", "ALIGNMENT"
 
@@ -168,11 +173,11 @@ def _fanuc_kept(offset: Offset, kind: str, number: int) -> Iterator[str]:
     if not number:
         return
     mark = _mark(kind, number)
-    yield f"(THE OLD {offset.word} IS KEPT IN #801 TO #803 FOR {kind} {number}, THE NUMBER IN #800)"
-    yield f"IF[#800EQ{mark}]GOTO8010"
+    yield f"(THE OLD {offset.word} IS KEPT IN #{KEPT_MARK + 1} TO #{KEPT_MARK + 3} FOR {kind} {number}, THE NUMBER IN #{KEPT_MARK})"
+    yield f"IF[#{KEPT_MARK}EQ{mark}]GOTO8010"
     for name, place in _KEPT.items():
-        yield f"#80{place}=#{_first_variable(offset) + place - 1} ({name})"
-    yield f"#800={mark}"
+        yield f"#{KEPT_MARK + place}=#{_first_variable(offset) + place - 1} ({name})"
+    yield f"#{KEPT_MARK}={mark}"
     yield "N8010"
 
 
@@ -224,11 +229,12 @@ def _fanuc_restored(text: "ZeroText | FrameText", offset: Offset, mark: int) -> 
     if isinstance(text, FrameText) and text.table is not None:
         yield "(THE TABLE STAYS WHERE IT IS)"
     yield from unit_check.fanuc()
-    yield f"IF[#800NE{mark}]GOTO9999"
+    yield f"IF[#{KEPT_MARK}NE{mark}]GOTO9999"
     if turned:
         yield "G69 (ENDS THE ROTATION OF THE TEXT)"
-    yield f"G90 G10 {'L20' if offset.extended else 'L2'} P{offset.number} X#801 Y#802 Z#803"
-    yield "#800=0"
+    kept = " ".join(f"{name}#{KEPT_MARK + place}" for name, place in _KEPT.items())
+    yield f"G90 G10 {'L20' if offset.extended else 'L2'} P{offset.number} {kept}"
+    yield f"#{KEPT_MARK}=0"
     yield "M99"
     yield "N9999 #3000=1(INBAND OLD WORK OFFSET NOT KEPT)"
     yield "M99"

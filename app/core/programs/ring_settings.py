@@ -80,10 +80,10 @@ FIRST_REGISTERS: Final = {RingControl.SINUMERIK: 0, RingControl.FANUC: 700, Ring
 """Where the block begins if nothing is said; 0: in `INBAND[98]`, a field of its own."""
 NOT_FREE: Final = {
     RingControl.SINUMERIK: (range(100),),
-    RingControl.FANUC: (range(500), range(598, 600)),
-    RingControl.HAAS: (range(500), range(550, 600), range(10000, 10500), range(10550, 10600)),
+    RingControl.FANUC: (range(500), range(598, 604)),
+    RingControl.HAAS: (range(500), range(550, 604), range(10000, 10500), range(10550, 10604)),
 }
-"""Variables that the measuring cycles, the probes and the correction texts use, or that a reset clears."""
+"""Variables that the measuring cycles, the probes and the texts of corrections and work offsets use, or that a reset clears."""
 HIGHEST: Final = {RingControl.SINUMERIK: 32_535, RingControl.FANUC: 999, RingControl.HAAS: 10_999}
 """The last variable that a program can keep over power off."""
 HIGHEST_OF_ALL: Final = max(HIGHEST.values())

@@ -68,7 +68,7 @@ def write_alignment(
 ) -> Response:
     """The text that puts the frame where the part lies, for the machine's control or another. It may run twice: the result is the same.
 
-    Where it sets a work offset again it keeps the old one on the control first (R90 to R96, #800 to #803), and `restore=true`
+    Where it sets a work offset again it keeps the old one on the control first (R90 to R96, #600 to #603), and `restore=true`
     is the text that sets it back.
 
     With warnings that nobody has acknowledged it begins with a block that stops the control.

@@ -152,7 +152,7 @@ def write_work_zero(
 ) -> Response:
     """The text that sets the work zero, for the machine's control or for another one. It may run twice: the result is the same.
 
-    It keeps the old offset on the control first (R90 to R96, #800 to #803), and `restore=true` is the text that sets it back.
+    It keeps the old offset on the control first (R90 to R96, #600 to #603), and `restore=true` is the text that sets it back.
 
     With warnings that nobody has acknowledged it begins with a block that stops the control.
     """

@@ -148,7 +148,9 @@ def test_the_sequence_ends_with_seven_digits() -> None:
         measure(control, 40.0)
 
 
-@pytest.mark.parametrize(("register", "program"), [(499, 9825), (930, 9825), (700, 0), (700, 9998)])
-def test_variables_that_do_not_last_are_refused(register: int, program: int) -> None:
-    with pytest.raises(ValueError, match="is"):
+@pytest.mark.parametrize(
+    ("register", "program"), [(499, 9825), (530, 9825), (603, 9825), (930, 9825), (700, 0), (700, 9998)]
+)
+def test_variables_that_do_not_last_or_belong_to_other_texts_are_refused(register: int, program: int) -> None:
+    with pytest.raises(ValueError, match=r"is|leave"):
         dprnt_programs(register, program)

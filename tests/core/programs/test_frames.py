@@ -11,6 +11,7 @@ from app.core.geometry.frames import frame, from_angles, turned
 from app.core.geometry.points import Floats
 from app.core.programs import unit_check
 from app.core.programs.frames import FrameText, ZeroText, offset_of, write_frame, write_restored, write_zero
+from app.core.programs.ring_settings import TOOLS, Offsets, RingControl, RingError, RingSettings
 from tests.core.programs.controls import Fanuc, Sinumerik, Stopped
 
 angles = st.floats(-60, 60)
@@ -242,6 +243,21 @@ def test_run_on_a_control_the_old_offset_comes_back(control: str, at: int, inch:
     assert held() == [*old.values()]
     with pytest.raises(Stopped):  # it came back once
         machine.run(restores)
+
+
+@pytest.mark.parametrize(("control", "offsets"), [("fanuc", Offsets.LATHE), ("haas", Offsets.MILL)])
+def test_no_text_writes_what_the_ring_programs_keep(control: str, offsets: Offsets) -> None:
+    """The mark of work zero 1 would hold corrections back, a correction's number come back as a work offset."""
+    text = texts_with_a_base("fanuc")[0]
+    both = write_zero("fanuc", text) + (write_restored("fanuc", text) or "")  # type: ignore[arg-type]
+    common = {int(number) for number in re.findall(r"#(\d+)", both) if 100 <= int(number) < 1000}
+    assert len(common) == 4
+    used = common | {number + 10_000 for number in common}  # a Haas has its #600 as #10600 too
+    ring = RingSettings(RingControl(control), offsets)
+    assert not used & {*range(ring.first_register, ring.first_effect + TOOLS + 1)}
+    for number in common:
+        with pytest.raises(RingError, match="taken"):
+            RingSettings(RingControl(control), offsets, first_register=number)
 
 
 def test_an_alignment_that_sets_no_work_offset_has_nothing_to_set_back() -> None:

@@ -77,7 +77,7 @@ class TestSix:
         path = f"/api/v1/alignments/{made['id']}/program?restore=true"
         assert made["program"].index("R91=$P_UIFR[2,X,TR]") < made["program"].index("$P_UIFR[2]=CTRANS")
         assert f"IF R90<>-{made['id']} GOTOF INBAND_OTHER" in common_shop.admin.get(path).text
-        assert "X#801 Y#802 Z#803" in common_shop.admin.get(f"{path}&control=fanuc").text
+        assert "X#601 Y#602 Z#603" in common_shop.admin.get(f"{path}&control=fanuc").text
         frame = post(common_shop, touches=SIX)["id"]
         told = common_shop.admin.get(f"/api/v1/alignments/{frame}/program?restore=true")
         assert told.status_code == 404

@@ -192,7 +192,7 @@ class TestRing:
 
     def test_what_cannot_be_is_refused_in_words(self, shop: Shop) -> None:
         refused = written(shop, shop.characteristic, 422, ring="all", control="haas", first_register=500)
-        assert "must leave 550 to 599 free" in refused
+        assert "must leave 550 to 603 free" in refused
         assert "must be one of" in written(shop, shop.characteristic, 422, ring="definition", control="fanuc")
         assert "haas" in written(shop, shop.characteristic, 422, control="haas")
         written(shop, shop.characteristic, 422, ring="call", control="fanuc", measured="#1) M30")
