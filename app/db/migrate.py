@@ -31,8 +31,10 @@ MIGRATIONS = HOUSE / "migrations"
 OTHERS_TURN = "10min"
 SQUASHED = "0018"
 """Last of the revisions of the first published program. Its tables are those of the first schema, so it is stamped as that."""
-CARRIER = "ef7d1ef"
-"""The last commit of Inband that carries these revisions, 0001 to `SQUASHED`, one by one."""
+FOLDED = "0135"
+"""The last revision of those that became the four after 0101: a database that ran them one by one has the same tables."""
+CARRIERS = {SQUASHED: "ef7d1ef of 2026-11-22", FOLDED: "5993ea4f of 2026-11-27"}
+"""The last commits that carry the revisions up to these, one by one."""
 OPTIONS = f"-c timezone=UTC -c lock_timeout={LOCK_PATIENCE}"
 
 
@@ -288,12 +290,12 @@ def _pending(connection: Connection) -> list[str]:
     if now == SQUASHED:
         now = scripts.get_base()
     if now is not None and now not in {script.revision for script in scripts.walk_revisions()}:
-        if re.fullmatch(r"\d{4}", now) and now < SQUASHED:
+        if re.fullmatch(r"\d{4}", now) and (last := next((last for last in CARRIERS if now < last), None)):
             raise MigrationError(
-                f"the database is at revision {now}, of the first program while it was made; this Inband goes on from the last "
-                f"one of that, {SQUASHED}. Make a backup with the Inband that has served it. Then check out commit {CARRIER} "
-                f"of 2026-11-22, which carries 0001 to {SQUASHED}, and run its `inband migrate` on this database; after that, "
-                "start this Inband."
+                f"the database is at revision {now}, of a program that was never published; this Inband goes on from the last "
+                f"one of those, {last}. Make a backup with the Inband that has served it. Then check out commit "
+                f"{CARRIERS[last]}, which carries the revisions up to {last}, and run its `inband migrate` on this database; "
+                "after that, start this Inband."
             )
         raise MigrationError(
             f"the database is at revision {now}, which this Inband does not know: a newer one has used it. "

@@ -233,7 +233,7 @@ def test_an_older_program_gets_its_schema_back_when_somebody_says_what_may_be_lo
     back = ["migrate", "--back-to", migrate.SQUASHED, "--database-url", first_program]
     asked = inband(*back)
     assert asked.returncode == 1
-    assert "0103 Stations: devices bound to machines, PINs and badges of people: loses devices, PINs" in asked.stderr
+    assert "0106 Stations, wall screens, bridges and what a machine runs: loses devices, PINs, badges" in asked.stderr
     assert "make a backup" in asked.stderr
     assert migrate.current(first_program) == migrate.head()
     done = inband(*back, "--yes")
@@ -248,7 +248,7 @@ def test_an_early_schema_is_refused_with_the_way_on(new_database: NewDatabase) -
     for command in (["serve", "--port", str(free_port())], ["key", "add", "--role", "viewer"], ["check"], ["migrate"]):
         done = inband(*command, "--database-url", url)
         assert done.returncode == 1
-        assert f"check out commit {migrate.CARRIER}" in " ".join(done.stderr.split())
+        assert f"check out commit {migrate.CARRIERS[migrate.SQUASHED]}" in " ".join(done.stderr.split())
     assert migrate.current(url) == "0012"
 
 

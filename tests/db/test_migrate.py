@@ -241,13 +241,14 @@ def test_a_server_goes_on_where_the_first_program_stopped(first_program: str, ru
             assert ana.get(page).status_code == 200, page
 
 
-def test_a_database_of_an_earlier_revision_is_left_alone(new_database: NewDatabase) -> None:
+@pytest.mark.parametrize(("revision", "last"), [("0017", migrate.SQUASHED), ("0121", migrate.FOLDED)])
+def test_a_database_of_an_earlier_revision_is_left_alone(new_database: NewDatabase, revision: str, last: str) -> None:
     url = new_database()
     with psycopg.connect(url, autocommit=True) as connection:
-        connection.execute("UPDATE alembic_version SET version_num = '0017'")
-    with pytest.raises(MigrationError, match=rf"revision 0017.*goes on from.*{migrate.SQUASHED}.*{migrate.CARRIER}"):
+        connection.execute("UPDATE alembic_version SET version_num = %s", [revision])
+    with pytest.raises(MigrationError, match=rf"revision {revision}.*goes on from.*{last}.*{migrate.CARRIERS[last]}"):
         migrate.upgrade(url)
-    assert migrate.current(url) == "0017"
+    assert migrate.current(url) == revision
 
 
 def test_of_processes_that_start_together_one_migrates(empty_database: str) -> None:

@@ -252,7 +252,7 @@ class TestPlantOnANode:
         self, client: httpx.Client, coordinator: str
     ) -> None:
         url = in_schema(coordinator, "far")
-        migrate.downgrade(url, "0103")
+        migrate.downgrade(url, "0101")
         assert len(migrate.upgrade(url)) >= 1
         with psycopg.connect(url, autocommit=True) as connection:  # facts in tables that were made there, too
             assert citus.unprotected(connection) == []
@@ -279,7 +279,7 @@ class TestPlantOnANode:
         self, client: httpx.Client, coordinator: str, monkeypatch: pytest.MonkeyPatch
     ) -> None:
         url = in_schema(coordinator, "far")
-        migrate.downgrade(url, "0107")
+        migrate.downgrade(url, "0101")
         with monkeypatch.context() as ended:  # the migration ended before it came to that
             ended.setattr(citus, "protect", lambda _connection: None)
             migrate.upgrade(url)

@@ -294,7 +294,7 @@ def test_migrate_and_check_look_at_every_plant(new_database: NewDatabase) -> Non
             commands.add_plant(
                 key, name=None, schema=None, host=None, timezone=None, shifts=None, data_dir=None, database_url=url
             )
-        migrate.downgrade(in_schema(url, "west"), "0109")
+        migrate.downgrade(in_schema(url, "west"), "0112")
         connection.execute("UPDATE east.alembic_version SET version_num = '9999'")
     pending, checked = migrate.pending(in_schema(url, "west")), inband("check", "--database-url", url)
     assert checked.returncode == 1

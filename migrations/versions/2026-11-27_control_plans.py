@@ -1,20 +1,20 @@
-"""Control plans of characteristics, and the measurements that were missed.
+"""Control plans and missed measurements; the rule and the weeks of capability verdicts, the shifts of baselines.
 
-`downgrade` loses them; the record of changes keeps every plan.
+`downgrade` loses them; the record of changes keeps every plan. Verdicts are judged again by the job.
 
-Revision ID: 0125
-Revises: 0124
+Revision ID: 0113
+Revises: 0112
 Create Date: 2026-11-27
 """
 
 from alembic import op
 
-revision = "0125"
-down_revision: str | None = "0124"
+revision = "0113"
+down_revision: str | None = "0112"
 branch_labels = None
 depends_on = None
 
-UPGRADE = (
+UPGRADE = (  # one by one: a plant may lie on a node of Citus
     """
     CREATE TABLE control_plan (
         machine_id INTEGER NOT NULL,
@@ -30,6 +30,8 @@ UPGRADE = (
         reason TEXT NOT NULL,
         since timestamptz DEFAULT now() NOT NULL,
         seen BIGINT DEFAULT 0 NOT NULL,
+        required_context TEXT[] DEFAULT '{}' NOT NULL,
+        context_seen BIGINT DEFAULT 0 NOT NULL,
         CONSTRAINT control_plan_pkey PRIMARY KEY (machine_id, characteristic_id),
         CONSTRAINT control_plan_machine_id_characteristic_id_fkey FOREIGN KEY (machine_id, characteristic_id)
             REFERENCES characteristic (machine_id, id),
@@ -37,6 +39,7 @@ UPGRADE = (
         CONSTRAINT control_plan_minutes_check CHECK (minutes > 0)
     )
     """,
+    "ALTER TABLE machine_state ADD COLUMN planned BOOLEAN DEFAULT false NOT NULL",
     """
     CREATE TABLE missed_measurement (
         machine_id INTEGER NOT NULL,
@@ -67,6 +70,19 @@ UPGRADE = (
         OF machine_id, id, characteristic_id, by, after, found_at ON missed_measurement
         FOR EACH STATEMENT EXECUTE FUNCTION refuse_loss()
     """,
+    # Verdicts of rule 0 are judged again by the job.
+    "ALTER TABLE capability_verdict ADD COLUMN rule INTEGER DEFAULT 0 NOT NULL",
+    "ALTER TABLE capability_verdict ALTER COLUMN rule DROP DEFAULT",
+    "ALTER TABLE capability_verdict ADD COLUMN weeks JSONB",
+    # By these a baseline forms its subgroups; those of old baselines are not known, and are the shifts of the plant.
+    "ALTER TABLE baseline ADD COLUMN shifts TEXT",
+)
+DOWNGRADE = (
+    "ALTER TABLE baseline DROP COLUMN shifts",
+    "ALTER TABLE capability_verdict DROP COLUMN weeks, DROP COLUMN rule",
+    "DROP TABLE missed_measurement",
+    "ALTER TABLE machine_state DROP COLUMN planned",
+    "DROP TABLE control_plan",
 )
 
 
@@ -76,5 +92,5 @@ def upgrade() -> None:
 
 
 def downgrade() -> None:
-    op.execute("DROP TABLE missed_measurement")
-    op.execute("DROP TABLE control_plan")
+    for command in DOWNGRADE:
+        op.execute(command)
