@@ -23,9 +23,9 @@ from app.access.keys import KeyRing
 from app.access.queries import still_granted
 from app.access.recognition import Lookups
 from app.core.compile_now import compile_each
-from app.db.connections import Connections, in_schema
+from app.db.connections import Connections
 from app.db.engine import Database
-from app.db.replica import Replica
+from app.db.replica import replica_of
 from app.geometry.alignment import api as alignments
 from app.geometry.alignment import pages as alignment_pages
 from app.geometry.alignment import pictures_api as alignment_pictures
@@ -323,22 +323,6 @@ def keep_for_good() -> None:
     gc.freeze()
 
 
-def _replica(settings: Settings, database: Database, waited: Callable[[float], object]) -> Replica | None:
-    url = settings.read_database_url
-    if url is None:
-        return None
-    if settings.schema_name is not None:
-        url = in_schema(url, settings.schema_name)
-    return Replica(
-        url,
-        database,
-        pool_size=settings.pool_size,
-        overflow=settings.pool_overflow,
-        most_behind=settings.read_most_behind,
-        waited=waited,
-    )
-
-
 def create_app(settings: Settings | None = None, ending: Callable[[], None] = lambda: None) -> Plants:
     """Make the application for one server process. Without settings they come from the environment.
 
@@ -415,10 +399,10 @@ def create_plant(settings: Settings, prefix: str = "") -> Application:
     connections = Connections(settings.database_url, settings.database_patience)
     waits = health.pool_waits()
     database, doors, background = _pools(settings, connections, waits)
-    replica = _replica(settings, database, waits.labels("replica").observe)
+    replica = replica_of(settings, database, waited=waits.labels("replica").observe)
     keys, directory = KeyRing(doors, caller_of_key), Directory(doors)
     writer, live, jobs = Writer(database), Live(connections, still_granted), JobRunner(background, jobs_of(settings))
-    report_worker, notifier = ReportWorker(background, replica), Notifier(background, settings, shift_words)
+    report_worker, notifier = ReportWorker(background, settings), Notifier(background, settings, shift_words)
 
     @asynccontextmanager
     async def lifespan(_app: FastAPI) -> AsyncIterator[None]:

@@ -11,14 +11,17 @@ import threading
 import time
 from collections import deque
 from collections.abc import Callable
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 from sqlalchemy import text
 from sqlalchemy.exc import SQLAlchemyError
 from sqlalchemy.orm import Session
 
-from app.db.connections import Connections
+from app.db.connections import Connections, in_schema
 from app.db.engine import Database
+
+if TYPE_CHECKING:
+    from app.settings import Settings
 
 EVERY = 1.0
 """Seconds between two looks at how far it has got."""
@@ -77,7 +80,7 @@ class Replica:
         self._thread: threading.Thread | None = None
 
     def start(self) -> None:
-        """Begin to look."""
+        """Begin to look each second."""
         self.connections.start()
         self._thread = threading.Thread(target=self._watch, name="replica watch", daemon=True)
         self._thread.start()
@@ -132,19 +135,23 @@ class Replica:
 
     def _watch(self) -> None:
         while not self._ending.wait(EVERY):
-            with contextlib.suppress(SQLAlchemyError):  # others tell of it; the lag is counted from what is known
-                self._samples.append((time.monotonic(), self.written()))
-            try:
-                with self.database.begin() as session:
-                    replayed = int(session.scalar(_REPLAYED) or 0)
-            except SQLAlchemyError as error:
-                self.behind = None
-                self._say(str(getattr(error, "orig", error)).split("\n", 1)[0])
-                continue
-            while self._samples and self._samples[0][1] <= replayed:
-                self._samples.popleft()
-            self.behind = time.monotonic() - self._samples[0][0] if self._samples else 0.0
-            self._say(f"it is {self.behind:.0f} s behind")
+            self.look()
+
+    def look(self) -> None:
+        """Look how far it has got."""
+        with contextlib.suppress(SQLAlchemyError):  # others tell of it; the lag is counted from what is known
+            self._samples.append((time.monotonic(), self.written()))
+        try:
+            with self.database.begin() as session:
+                replayed = int(session.scalar(_REPLAYED) or 0)
+        except SQLAlchemyError as error:
+            self.behind = None
+            self._say(str(getattr(error, "orig", error)).split("\n", 1)[0])
+            return
+        while self._samples and self._samples[0][1] <= replayed:
+            self._samples.popleft()
+        self.behind = time.monotonic() - self._samples[0][0] if self._samples else 0.0
+        self._say(f"it is {self.behind:.0f} s behind")
 
     def _say(self, why: str) -> None:
         """Log when it begins to be read, and when it ends."""
@@ -155,6 +162,27 @@ class Replica:
         else:
             log.warning("charts, reports and searches read the server that is written to, not the replica: %s", why)
         self._read = self.usable
+
+
+def replica_of(
+    settings: "Settings",
+    primary: Database,
+    *,
+    pool_size: int | None = None,
+    waited: Callable[[float], object] | None = None,
+) -> Replica | None:
+    """The copy that the settings name, not watched yet; None where they name none. pool_size, waited: as of `Database`."""
+    if settings.read_database_url is None:
+        return None
+    url = settings.read_database_url
+    return Replica(
+        in_schema(url, settings.schema_name) if settings.schema_name is not None else url,
+        primary,
+        pool_size=pool_size or settings.pool_size,
+        overflow=settings.pool_overflow,
+        most_behind=settings.read_most_behind,
+        waited=waited,
+    )
 
 
 def _has(session: Session, must_see: MustSee) -> bool:

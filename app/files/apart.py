@@ -148,7 +148,7 @@ def sweep() -> None:
 def begin() -> None:
     """Do the task of the folder named on the command line."""
     folder, parent = Path(sys.argv[1]), int(sys.argv[2])
-    _end_with(parent)
+    end_with(parent)
     limits, language, work, given = pickle.loads((folder / "task").read_bytes())  # noqa: S301 - of our own server
     _keep(limits)
     try:
@@ -179,8 +179,11 @@ def _done(language: str, work: Callable[..., Any], given: tuple[Any, ...]) -> tu
         return False, traceback.format_exc(-5)
 
 
-def _end_with(parent: int) -> None:
-    """End when the server does, however that ends. Elsewhere than on Linux the limit of time has to do."""
+def end_with(parent: int) -> None:
+    """End this process when that one does, however that ends. Does nothing elsewhere than on Linux.
+
+    To the system the parent is the thread that began this process: it has to wait for it.
+    """
     if sys.platform == "linux":
         import ctypes
 

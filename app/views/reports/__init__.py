@@ -6,5 +6,6 @@ queries     gathers its content
 drawing     the charts of the pages as lines and text, for paper
 files       PDF, XLSX, CSV, and many of them in one file
 actions     many at once: asked for, made in the background, cancelled
-worker      the thread that makes them
+worker      the thread that has them made
+maker       the process that makes them
 """

@@ -30,7 +30,7 @@ FILE: dict[int | str, dict[str, Any]] = {
 
 
 def report_worker(request: Request) -> ReportWorker:
-    """The thread of this process that makes them."""
+    """The thread of this server that has them made."""
     worker: ReportWorker = request.app.state.report_worker
     return worker
 

@@ -1,59 +1,58 @@
-"""The thread that makes reports which were asked for many at once: one job at a time, one characteristic at a time.
+"""The thread of the server that has reports made which were asked for many at once: one job at a time, in a process of their own.
 
-Anyone who works on a job holds an advisory lock with its number, on a connection of its own: when the process ends, however it
-ends, the lock is free, and another process – or the same one, restarted – goes on behind the last characteristic that is ready.
-After each characteristic the thread rests as long as it worked: readings come first. What a report shows is read from the
-standby, where one is named and has everything that was stored when the job was taken up.
+Anyone who works on a job holds an advisory lock with its number, on a connection of its own: when the server ends, however it
+ends, the lock is free, and another server – or the same one, restarted – goes on behind the last characteristic that is ready.
+The process is begun when something waits, and ends when nothing has come for a while: it would hold the interpreter that
+readings need, and memory that nobody does.
 """
 
 import asyncio
 import logging
+import os
+import subprocess
+import sys
 import threading
 import time
-from contextvars import copy_context
-from datetime import UTC, datetime
-from uuid import uuid4
+from contextlib import suppress
+from pathlib import Path
 
 import psycopg
-from sqlalchemy.exc import DBAPIError, OperationalError
-from sqlalchemy.orm import Session
+from sqlalchemy.exc import OperationalError
 
+import app
 from app.db.engine import Database
 from app.db.outage import Outage
-from app.db.replica import MustSee, Replica
-from app.errors import InbandError
-from app.files.documents.content import Report
-from app.jobs.actions import DatabaseGone, Unit, end_failure, note_failure, paused_units
-from app.language.i18n import _, speaking
-from app.loop.characteristics import queries as characteristics
-from app.quality.proof import queries as proof
-from app.views.reports import actions, queries
-from app.views.reports.bundle import MOST_BYTES, Bundle, Part, file_name, packed
+from app.jobs.actions import DatabaseGone, Unit, note_failure, paused_units
+from app.settings import Settings
+from app.views.reports import queries
+from app.views.reports.maker import NAME
 
 log = logging.getLogger(__name__)
 
 EVERY = 2.0  # s between two looks for something to do
-LONGEST_REST = 1.0  # s
-NAME = "making_reports"  # as periodic jobs have one, where it fails
+KEPT = 30.0  # s that the process waits for more
+END_WITHIN = 10.0  # s
+PROGRAM = "from app.views.reports.maker import main; main()"
 LOCK = "'report_job'::regclass::oid::int4, %s"
 """Key of a job's advisory lock. Each plant has a table of its own, and so numbers of its own."""
 
 
 class ReportWorker:
-    """Makes reports in one process."""
+    """Has reports made for one plant, for one server process."""
 
-    def __init__(self, database: Database, replica: Replica | None = None, every: float = EVERY) -> None:
+    def __init__(self, database: Database, settings: Settings) -> None:
         self._database = database
-        self._replica = replica
-        self._every = every
+        self._settings = settings.model_dump_json(include=set(Settings.model_fields))
         self._closing = threading.Event()
         self._wake = threading.Event()
         self._thread: threading.Thread | None = None
+        self._maker: subprocess.Popen[str] | None = None
+        self._last = 0.0  # when the process has last ended a job
         self._outage = Outage(log, "reports")
 
     def start(self) -> None:
         """Begin to look for something to do."""
-        self._thread = threading.Thread(target=copy_context().run, args=(self._go,), name="reports", daemon=True)
+        self._thread = threading.Thread(target=self._go, name="reports", daemon=True)
         self._thread.start()
 
     def wake(self) -> None:
@@ -61,11 +60,13 @@ class ReportWorker:
         self._wake.set()
 
     async def stop(self) -> None:
-        """End after the characteristic that is being worked on; the rest is somebody else's, or tomorrow's."""
+        """End in the middle of a characteristic: it and the rest are somebody else's, or tomorrow's."""
         self._closing.set()
         self._wake.set()
+        if self._maker is not None:
+            self._maker.kill()
         if self._thread is not None:
-            await asyncio.to_thread(self._thread.join, 10)
+            await asyncio.to_thread(self._thread.join, END_WITHIN)
 
     def _go(self) -> None:
         while not self._closing.is_set():
@@ -76,107 +77,75 @@ class ReportWorker:
                 self._outage.goes_on(error)
             except Exception:
                 log.exception("unhandled error in making reports")
-            self._wake.wait(self._every)
+            self._wake.wait(EVERY)
             self._wake.clear()
+        self._end()
 
     def _look(self) -> None:
         with self._database.begin() as session:
             waiting = queries.open_jobs(session)
             paused = paused_units(session, NAME, [Unit(f"reports/{number}") for number in waiting])
         if not waiting:
+            if time.monotonic() > self._last + KEPT:
+                self._end()
             return
         with self._database.connections.connect(autocommit=True, application_name="inband-reports") as ours:
             for number in waiting:
                 if self._closing.is_set():
                     return
-                subject = f"reports/{number}"
-                if paused.get(subject) or not _taken(ours, number):
+                if paused.get(f"reports/{number}") or not _taken(ours, number):
                     continue
                 try:
                     self._make(number)
-                    if subject in paused:
-                        with self._database.begin() as session:
-                            end_failure(session, NAME, Unit(subject))
-                except Exception as error:  # noqa: BLE001 - recorded; one takes no other along, and is tried again later
-                    note_failure(self._database, NAME, Unit(subject), error)
                 finally:
                     ours.execute(f"SELECT pg_advisory_unlock({LOCK})", (number,))
 
     def _make(self, number: int) -> None:
-        token = uuid4().hex
-        with self._database.begin() as session:
-            stored = actions.take(session, number, token)
-            ready = actions.places(queries.parts(session, number))
-        if stored is None:
+        answer = ""
+        with suppress(BrokenPipeError):  # it has ended; so does its answer
+            answer = self._asked(number)
+        self._last = time.monotonic()
+        if self._closing.is_set():
             return
-        bundle = Bundle.of(stored)
-        must_see = MustSee(written=self._replica.written() if self._replica else 0)
-        proof.proof()  # what is handed over says it if an example fails; a page does not wait for that, this does
-        with speaking(bundle.language):
-            for place, key in enumerate(bundle.keys):
-                if place in ready:
-                    continue
-                began = time.monotonic()
-                if self._closing.is_set() or not self._one(number, token, bundle, place, key, must_see):
-                    return
-                self._closing.wait(min(LONGEST_REST, time.monotonic() - began))
-            self._pack(number, token, bundle)
+        if not answer:
+            ended = RuntimeError(f"the process that makes reports ended with {self._end()}")
+            note_failure(self._database, NAME, Unit(f"reports/{number}"), ended)
+        elif answer.strip():
+            raise DatabaseGone(answer.strip())
 
-    def _one(self, number: int, token: str, bundle: Bundle, place: int, key: str, must_see: MustSee) -> bool:
-        """One characteristic; what is wrong with it is written down and spoils no other. False if nobody wants it any more."""
-        with self._database.begin() as session:
-            if not actions.begin(session, number, token, key):
-                return False
-            by = queries.job(session, number).asked_by
-        content, trouble = None, None
-        try:
-            content = bundle.part(self._report(bundle, key, by, must_see))
-        except InbandError as error:
-            trouble = f"{error.detail} {error.what_to_do or ''}".strip()
-        except Exception as error:
-            if isinstance(error, DBAPIError) and error.connection_invalidated:
-                raise
-            log.exception("the report of %s could not be made (reports %s)", key, number)
-            trouble = _("The report could not be created; the server's log says why.")
-        with self._database.begin() as session:
-            return actions.keep(session, number, token, place, key, content, trouble)
+    def _asked(self, number: int) -> str:
+        if self._maker is None:
+            self._maker = self._begun()
+            if self._closing.is_set():  # meanwhile: nobody else ends it
+                self._end()
+                return ""
+        assert self._maker.stdin is not None
+        assert self._maker.stdout is not None
+        self._maker.stdin.write(f"{number}\n")
+        self._maker.stdin.flush()
+        return self._maker.stdout.readline()
 
-    def _report(self, bundle: Bundle, key: str, by: str, must_see: MustSee) -> Report:
-        """The report of one characteristic, read from the standby if it will do."""
-        reading = self._replica.begin(must_see) if self._replica else None
-        if self._replica is not None and reading is not None:
-            try:
-                with reading:
-                    return _report_of(reading, bundle, key, by)
-            except DBAPIError as error:  # it has ended the query, or is gone
-                self._replica.failed(error)
-        with self._database.begin() as session:
-            return _report_of(session, bundle, key, by)
+    def _begun(self) -> subprocess.Popen[str]:
+        maker = subprocess.Popen(  # noqa: S603 - our own words
+            [sys.executable, "-c", PROGRAM, str(os.getpid())],
+            env=os.environ | {"PYTHONPATH": str(Path(app.__path__[0]).parent)},
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            text=True,
+            encoding="utf-8",
+        )
+        assert maker.stdin is not None
+        maker.stdin.write(f"{self._settings}\n")
+        return maker
 
-    def _pack(self, number: int, token: str, bundle: Bundle) -> None:
-        with self._database.begin() as session:
-            job = queries.job(session, number)
-            parts = [Part(part.characteristic, part.content, part.trouble) for part in queries.parts(session, number)]
-        size = sum(len(part.content or b"") for part in parts)
-        if size > MOST_BYTES:
-            trouble = _("The file would be larger than {n} MB: ask for fewer characteristics or sections at once.")
-            with self._database.begin() as session:
-                actions.fail(session, number, token, trouble.format(n=MOST_BYTES // 1_000_000))
-            return
-        try:
-            whole = packed(bundle.form, parts, job.asked_at)
-        except Exception:
-            log.exception("the file of reports %s could not be put together", number)
-            with self._database.begin() as session:
-                actions.fail(session, number, token, _("The file could not be created; the server's log says why."))
-            return
-        with self._database.begin() as session:
-            actions.finish(session, number, token, file_name(number, bundle.form), whole)
-
-
-def _report_of(session: Session, bundle: Bundle, key: str, by: str) -> Report:
-    current = characteristics.characteristic_named(session, key)
-    return queries.report_of(session, current, bundle.request, datetime.now(UTC), by)
+    def _end(self) -> int | None:
+        """End the process; the code that it ended with, None if there was none."""
+        maker, self._maker = self._maker, None
+        if maker is None:
+            return None
+        maker.kill()
+        with maker:
+            return maker.wait()
 
 
 def _taken(ours: "psycopg.Connection[tuple[object, ...]]", number: int) -> bool:

@@ -2,10 +2,13 @@
 
 import csv
 import io
+import os
+import signal
 import zipfile
 from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import ExitStack, contextmanager
+from pathlib import Path
 from typing import Any
 
 import httpx
@@ -13,11 +16,13 @@ import psycopg
 import pytest
 from openpyxl import load_workbook
 from playwright.sync_api import Page, expect
+from psycopg.rows import dict_row
 from pypdf import PdfReader
 
 from app.access import actions as people
 from app.views.reports import actions
 from app.views.reports.bundle import Bundle
+from app.views.reports.maker import NICE
 from app.views.reports.request import ReportRequest, SectionName
 from app.views.reports.tables import ReportJob
 from tests.conftest import RunServer, Server
@@ -267,6 +272,21 @@ class TestKilled:
         for place, content in left.items():
             assert whole.read(f"report-bore-{place}.pdf") == content, "what was ready was not made again"
 
+    def test_the_process_that_makes_them_takes_nothing_else_along(self, bores: Shop, server: Server) -> None:
+        with held_up(bores) as let_one_pass:
+            number = ask(bores, characteristics=keys(2))["id"]
+            let_one_pass(number)
+            (maker,) = makers(server)
+            assert os.getpriority(os.PRIO_PROCESS, maker) >= NICE, "readings go first"
+            os.kill(maker, signal.SIGKILL)
+            (failure,) = until(lambda: failures(bores, number))
+        assert "the process that makes reports ended with -9" in failure["error"]
+        with psycopg.connect(server.database.dsn) as connection:
+            connection.execute("UPDATE job_failure SET retry_at = now()")  # not in a minute
+        job = done(bores, number)
+        assert (job["state"], job["done"], job["problems"]) == ("done", 2, 0)
+        until(lambda: not failures(bores, number))
+
     @pytest.mark.long
     def test_another_process_takes_it_up(self, bores: Shop, server: Server, run_server: RunServer) -> None:
         """Two servers on one database: one is killed while it works, the other one finishes."""
@@ -282,6 +302,21 @@ class TestKilled:
             whole = zipfile.ZipFile(io.BytesIO(other.get(f"/api/v1/reports/{number}/file").content))
             assert len(whole.namelist()) == 5
         server.restart()
+
+
+def makers(server: Server) -> list[int]:
+    """Processes of this server that make reports."""
+    children = [
+        int(pid)
+        for file in Path(f"/proc/{server.process.pid}/task").glob("*/children")
+        for pid in file.read_text().split()
+    ]
+    return [pid for pid in children if b"app.views.reports.maker" in Path(f"/proc/{pid}/cmdline").read_bytes()]
+
+
+def failures(shop: Shop, number: int) -> list[Any]:
+    with psycopg.connect(shop.server.database.dsn, row_factory=dict_row) as connection:
+        return connection.execute("SELECT * FROM job_failure WHERE subject = %s", [f"reports/{number}"]).fetchall()
 
 
 def ready(server: Server, number: int) -> dict[int, bytes]:
