@@ -35,7 +35,7 @@ from app import HOUSE
 from app.db import migrate
 from app.db.embedded import EmbeddedServer
 from app.db.engine import Database
-from tests import chance, keeper, one_connection, quick_passwords  # noqa: F401 - the last two replace what they are about
+from tests import chance, forked, keeper, one_connection, quick_passwords  # noqa: F401 - the last two replace what they are about
 from tests.db.first_program import make_first_program
 from tests.forked import Forked
 from tests.server_logs import follow, pytest_runtest_makereport, pytest_runtest_setup  # noqa: F401 - hooks of pytest
@@ -58,6 +58,14 @@ def pytest_configure(config: pytest.Config) -> None:
     gc.disable()  # until all tests are collected
     if config.getoption("--one-connection"):
         os.environ |= {"INBAND_POOL_SIZE": "1", "INBAND_POOL_OVERFLOW": "0"}
+    if hasattr(config, "workerinput"):
+        forked.share(config.workerinput["fork_server"])
+
+
+@pytest.hookimpl(optionalhook=True)
+def pytest_configure_node(node: Any) -> None:
+    """One fork server reads the program for all workers, while they collect."""
+    node.workerinput["fork_server"] = forked.begin()
 
 
 def pytest_collection_finish() -> None:

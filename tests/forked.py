@@ -11,12 +11,29 @@ import subprocess
 import sys
 import tempfile
 import time
+from multiprocessing import forkserver, resource_tracker
 from multiprocessing.context import ForkServerProcess
 from pathlib import Path
+from typing import Any
 
 from tests.keeper import PR_SET_PDEATHSIG, prctl
 
 multiprocessing.get_context("forkserver").set_forkserver_preload(["tests.preloaded", "tests.forked"])
+SERVER: Any = forkserver._forkserver  # there is no public way to share one
+SHARED = ("_forkserver_address", "_forkserver_authkey")
+"""What another process needs to know of a fork server; the key is there from Python 3.14 on."""
+
+
+def begin() -> dict[str, Any]:
+    """Let the fork server read the program from now on; the answer is for `share`, in another process of the same run."""
+    SERVER.ensure_running()
+    return {name: getattr(SERVER, name) for name in SHARED if hasattr(SERVER, name)}
+
+
+def share(begun: dict[str, Any]) -> None:
+    """Use the fork server of the process that has begun it, and that ends it."""
+    vars(SERVER).update(begun, _forkserver_alive_fd=os.open(os.devnull, os.O_RDONLY))
+    SERVER.ensure_running = resource_tracker.ensure_running
 
 
 def inband(
