@@ -26,7 +26,7 @@ from app.loop.tables.alarms import Alarm
 from app.loop.tables.machines import Machine
 from app.loop.tables.tools import Correction, Tool, ToolEvent
 from app.loop.tools import queries, wording
-from app.loop.tools.actions import Decided, locked, must_be, record_status
+from app.loop.tools.actions import Decided, locked, record_status
 from app.loop.tools.alarm_kinds import OFFSET_DIFFERS
 from app.loop.tools.events import alarm_raised, tool_changed
 from app.loop.tools.queries import OFFSET_TOLERANCE
@@ -46,13 +46,16 @@ def mark_applied(
 ) -> Decided:
     """A pending correction is in the offset now. Saying so twice is harmless.
 
-    A machine that applies everything it has fetched and then confirms one after the other reports the last offset each
-    time: if that is what later pending corrections of the tool lead to, they are in effect, too. Any other offset than
-    the expected one raises *offset differs*, becomes the known offset and pauses the tool. mapping: hash of the mapping by
-    which a bridge converted it for the control.
+    A machine that applies everything it has fetched and then confirms one after the other, in whatever order, reports the
+    last offset each time: if that is what earlier and later pending corrections of the tool lead to, they are in effect,
+    too. Any other offset than the expected one raises *offset differs*, becomes the known offset and pauses the tool; so
+    does one that a machine reports with a correction that may not be in the offset. mapping: hash of the mapping by which
+    a bridge converted it for the control.
     Raises `NotFound`; `Conflict` for a correction that is not pending, or when another offset is reported the second time.
     """
     correction = locked(session, machine, number)
+    if correction.status not in {"pending", "applied"}:
+        raise _may_not_be_in(session, machine, correction, caller, offset_after)
     correction.mapping = correction.mapping or mapping
     if correction.status == "applied":
         if offset_after is None or not _differs(offset_after, correction.offset_after):
@@ -64,11 +67,10 @@ def mark_applied(
         late = offset_after - (correction.offset_after or 0.0)
         now = datetime.now(UTC)
         return _reported(
-            session, machine, [correction], tool, caller, tool.offset + late, tool.offset, tool.offset, now
+            session, machine, correction, [correction], tool, caller, tool.offset + late, tool.offset, tool.offset, now
         )
-    must_be(correction, machine, "applied", ("pending",))
     tool = queries.tool(session, machine, correction.tool_memory)
-    together = [correction, *_later_ones(session, machine, tool, correction, offset_after)]
+    together = _with_others(session, machine, tool, correction, offset_after)
     now = datetime.now(UTC)
     at = min(now, applied_at or now)
     for pending in together:
@@ -86,17 +88,35 @@ def mark_applied(
         if caller.kind != "machine":  # what a machine does all day is in the history of its tools
             record_status(session, machine, pending, caller, "correction applied", "pending", None)
     reported = tool.offset if offset_after is None else offset_after
-    return _reported(session, machine, together, tool, caller, reported, tool.offset, before, at)
+    return _reported(session, machine, correction, together, tool, caller, reported, tool.offset, before, at)
 
 
-def _later_ones(
+def _may_not_be_in(
+    session: Session, machine: Machine, correction: Correction, caller: Caller, offset_after: float | None
+) -> Conflict:
+    """The refusal of a confirmation of what awaits a person or has fallen.
+
+    What the control holds is true all the same, and nobody at a machine reads the answer: as any other reported offset it is
+    stored, although the confirmation is refused.
+    """
+    detail, instead = wording.refused(correction, machine.key, "applied")
+    if offset_after is not None and caller.kind == "machine":
+        note = report_offset(session, machine, correction.tool_memory, offset_after, caller).note
+        session.commit()
+        instead = note or instead
+    return Conflict(detail, instead, correction_status=correction.status)
+
+
+def _with_others(
     session: Session, machine: Machine, tool: Tool, correction: Correction, offset_after: float | None
 ) -> list[Correction]:
-    """The pending corrections after this one that the reported offset holds already; none if it is the expected one."""
-    running = round(tool.offset + correction.amount, DECIMALS)
-    if offset_after is None or not _differs(offset_after, running):
-        return []
-    return _leading_to(session, machine, tool, offset_after, running, correction.number)
+    """This correction and the pending ones that the reported offset holds as well, in their order."""
+    alone = round(tool.offset + correction.amount, DECIMALS)
+    if offset_after is None or not _differs(offset_after, alone):
+        return [correction]
+    later = _leading_to(session, machine, tool, offset_after, alone, correction.number)
+    led = [] if later else _leading_to(session, machine, tool, offset_after, tool.offset)
+    return led if correction in led else [correction, *later]
 
 
 def _leading_to(
@@ -116,6 +136,7 @@ def _leading_to(
 def _reported(
     session: Session,
     machine: Machine,
+    correction: Correction,
     confirmed: Sequence[Correction],
     tool: Tool,
     caller: Caller,
@@ -126,9 +147,9 @@ def _reported(
 ) -> Decided:
     """These corrections are in the offset, and this is the offset now; another one than expected pauses the tool.
 
-    before: the offset before the last of them was applied.
+    correction: the one that was confirmed; before: the offset before the last of them was applied.
     """
-    first, last = confirmed[0], confirmed[-1]
+    last = confirmed[-1]
     tool.offset = rounded(reported)
     for applied in confirmed:  # what was reported, so that saying it again is recognised
         applied.offset_after, applied.applied_by = tool.offset, caller.name
@@ -139,13 +160,14 @@ def _reported(
     ]
     if not _differs(tool.offset, expected):
         publish(session, *changes)
-        return Decided(first)
+        return Decided(correction)
     assumed = _is_assumed(session, machine, tool, [applied.number for applied in confirmed])
-    alarm, fallen = _pause(session, machine, tool, expected, first.number, assumed=assumed)
+    alarm, fallen = _pause(session, machine, tool, expected, correction.number, assumed=assumed)
     changes += [correction_changed(session, machine, superseded) for superseded in fallen]
     publish(session, *changes, alarm_raised(machine, alarm))
     return Decided(
-        first, wording.offset_differs(alarm.id, expected, tool.offset, [superseded.number for superseded in fallen])
+        correction,
+        wording.offset_differs(alarm.id, expected, tool.offset, [superseded.number for superseded in fallen]),
     )
 
 

@@ -94,8 +94,9 @@ def mark_applied(on: OfCorrection, applied: AppliedIn) -> Decided:
     """Confirm that the correction is in the offset now. Confirming twice is harmless.
 
     An `offset_after` that differs from `offset_expected` by more than 0.0005 mm raises the alarm *offset differs*: nothing
-    is corrected through this tool until somebody has said which offset is true. If it is the offset that later pending
-    corrections of the tool lead to, those are confirmed with this one.
+    is corrected through this tool until somebody has said which offset is true. If it is the offset that earlier or later
+    pending corrections of the tool lead to, those are confirmed with this one. A machine that confirms what may not be in
+    the offset is refused (409), and its `offset_after` is compared all the same.
     """
     return applying.mark_applied(
         on.session,

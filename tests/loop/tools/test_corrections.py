@@ -124,6 +124,40 @@ class TestApplied:
         assert "limit of the control" in problem["detail"]
         assert "−6.0" in problem["what_to_do"]
 
+    @pytest.mark.parametrize("fate", ["awaiting", "rejected", "fallen"])
+    def test_what_a_machine_holds_with_one_that_may_not_be_in_pauses_the_tool(self, shop: Shop, fate: str) -> None:
+        """Nobody at a machine reads the 409: without the alarm the same correction would be approved, and applied again."""
+        if fate == "awaiting":
+            number, tool = awaiting(shop), 4
+        else:
+            number, tool = pending(shop), 3
+            if fate == "rejected":
+                shop.correction(number, "rejected", reason="not now")
+            else:
+                shop.call("PUT", f"/machines/{shop.machine}/tools/3", offset=0.1, reason="set")
+        for _again in range(2):
+            problem = shop.correction(number, "applied", 409, client=shop.machine_client, offset_after=-0.0123)
+        (alarm,) = shop.alarms()
+        assert (alarm["kind"], alarm["tool_memory"], alarm["count"]) == ("offset_differs", tool, 1)
+        assert problem["correction_status"] == ("rejected" if fate == "rejected" else "superseded")
+        assert (shop.tool(tool)["offset"], shop.tool(tool)["paused_by"]) == (-0.0123, alarm["id"])
+        shop.correction(number, "approve", 409, reason="as expected")
+
+    def test_the_offset_expected_with_one_that_may_not_be_in_is_no_alarm(self, shop: Shop) -> None:
+        number = pending(shop)
+        shop.correction(number, "rejected", reason="not now")
+        shop.correction(number, "applied", 409, client=shop.machine_client, offset_after=0.0)
+        assert shop.alarms() == []
+
+    @pytest.mark.parametrize("order", [(0, 1, 2), (2, 1, 0), (1, 0, 2)])
+    def test_several_applied_at_once_are_confirmed_in_whatever_order(self, shop: Shop, order: tuple[int, ...]) -> None:
+        numbers = [shop.read(um)["correction"]["number"] for um in (6.0, 12.0, 18.0)]
+        for at in order:
+            answer = shop.correction(numbers[at], "applied", client=shop.machine_client, offset_after=-0.018)
+            assert (answer["number"], answer["status"], answer["offset_after"]) == (numbers[at], "applied", -0.018)
+        assert (shop.tool()["offset"], shop.tool()["total"]) == (-0.018, -0.018)
+        assert [alarm["kind"] for alarm in shop.alarms()] == ["oversize"]
+
     def test_the_time_of_a_machine_whose_clock_is_ahead_is_now(self, shop: Shop) -> None:
         ahead = datetime.now(UTC) + timedelta(hours=2)
         answer = shop.correction(pending(shop), "applied", applied_at=ahead.isoformat())
