@@ -167,7 +167,8 @@ class Problem(NamedTuple):
     Codes: required, unknown, twice, not_a_number, not_whole, not_a_choice, not_yes_no, range, order, target_missing,
     target_twice, tolerance_sign, sign_missing, factor_zero, accept, sections, tool_measured, contested, no_location, natural_corrected, and the warnings source_range,
     variant_axis, points_missing, not_on_lathe, factor_on_lathe, factor_outside, factor_inside, switch_value, switch_wins, switch_loses,
-    out_of_reach, spacing_missing, places_coincide, limits_as_sizes, averages_never, factor_of_tool, natural_assumed, natural_likely.
+    out_of_reach, spacing_missing, places_coincide, limits_as_sizes, averages_never, factor_of_tool, factor_of_a_unit, natural_assumed,
+    natural_likely.
     """
 
     field: str

@@ -13,6 +13,7 @@ CALIBRATION_RANGES = {"path_factor": (1, 10)}  # where L92 has another range tha
 SAME_PLACE = 0.05  # degrees between two places that are one
 COARSEST, COARSEST_SHARE = 1.0, 0.05  # mm, and share of the nominal: larger deviations are questioned
 NEAR = (0.5, 1.5)  # deviation / nominal, where it may be a limit of size
+FACTORS = (0.1, 5.0)  # size of a factor: ½, 1, 2 and what slopes make of them; 25.4 and 1000 are units
 
 
 def unusual(values: Mapping[str, Any]) -> Iterator[Problem]:
@@ -30,6 +31,7 @@ def unusual(values: Mapping[str, Any]) -> Iterator[Problem]:
     yield from _limits_as_sizes(values)
     yield from _averages_never(values)
     yield from _factor_of_tool(values)
+    yield from _factor_of_a_unit(values)
     window, confidence = values["path_factor"], values.get("confidence_limit")
     if confidence is not None and nanometres(confidence) > nanometres(window):
         data = {"value": confidence, "window": window}
@@ -78,6 +80,14 @@ def _factor_of_tool(values: Mapping[str, Any]) -> Iterator[Problem]:
     factor = values.get("factor")
     if values["feature"] == Feature.TOOL and values["mode"] == Mode.APPROVAL and factor is not None and factor < 0:
         yield Problem("factor", "factor_of_tool", {"value": factor}, warning=True)
+
+
+def _factor_of_a_unit(values: Mapping[str, Any]) -> Iterator[Problem]:
+    """Warn of a factor that turns mm into inches, or into steps: Inband's amounts are mm, and the bridge converts them."""
+    factor, (low, high) = values.get("factor"), FACTORS
+    corrects = values["tool_memory"] != 0 and values["mode"] != Mode.MEASURE_ONLY
+    if corrects and factor and not low <= abs(factor) <= high:
+        yield Problem("factor", "factor_of_a_unit", {"value": factor}, warning=True)
 
 
 def _outside(name: str, value: float, usual: tuple[float, float]) -> Iterator[Problem]:

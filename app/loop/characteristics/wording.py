@@ -316,6 +316,10 @@ def _of_tools(problem: Problem) -> dict[str, str]:
             "The factor {value} is negative: a longer tool would get a smaller offset, and no size would show it. As a rule it is "
             "+1, or +2 for a radius at an offset in diameter; if the control counts the other way, use the mode approval"
         ).format(value=f"{data.get('value', 0):+.10g}"),
+        "factor_of_a_unit": _(
+            "The factor {value} corrects {times} times as much as the part is off. Usual are −1, −0.5 and +0.5; amounts are mm, and "
+            "what a control holds in inches or steps is converted on its way"
+        ).format(value=f"{data.get('value', 0):+.10g}", times=f"{abs(data.get('value', 0)):.10g}"),
         "factor_zero": _("The factor must not be 0: nothing would ever be corrected. To only measure, set R10 to 0"),
     }
 

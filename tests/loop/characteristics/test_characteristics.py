@@ -131,6 +131,8 @@ class TestSetUp:
             ({"R24": 1}, "not_on_lathe", "variant"),
             ({"factor": 0.5}, "factor_on_lathe", "factor"),
             ({"R27": 11}, "source_range", "repeats"),
+            ({"factor": -25.4}, "factor_of_a_unit", "factor"),
+            ({"factor": -0.001}, "factor_of_a_unit", "factor"),
             ({"confidence_limit": 1.000001}, "out_of_reach", "confidence_limit"),
         ],
     )
