@@ -21,6 +21,7 @@ from app.loop.quarantine import queries, wording
 from app.loop.quarantine.queries import Listed, PartRow, QuarantineRow
 from app.loop.quarantine.schemas import SetAsideIn
 from app.loop.quarantine.tables import Quarantine, QuarantinedPart
+from app.loop.readings.by_hand.actions import must_be_mm
 from app.web.created import Created
 
 MOST_ROWS = 2_000
@@ -150,7 +151,8 @@ def decide(
 def measure_again(session: Session, number: int, part: int, measured: float, reason: str, caller: Caller) -> PartRow:
     """Decide about a part by its size: in tolerance it is released, outside it is scrapped.
 
-    Raises `Invalid` for a size nearer to a limit than the measuring uncertainty of the quarantine, and for a row of many parts.
+    Raises `Invalid` for a size nearer to a limit than the measuring uncertainty of the quarantine, for one in another unit than mm,
+    and for a row of many parts.
     """
     quarantine = queries.quarantine(session, number).quarantine
     found = queries.part(session, quarantine, part)
@@ -161,6 +163,7 @@ def measure_again(session: Session, number: int, part: int, measured: float, rea
             do=_("Release or scrap the row with a reason."),
         )
     parameters = characteristic_named(session, found.characteristic.key).parameters
+    must_be_mm("measured", measured, parameters.target)
     deviation, guard = rounded(measured - parameters.target), quarantine.guard
     good = in_tolerance(deviation, parameters.tolerance, guard)
     if not good and guard and in_tolerance(deviation, parameters.tolerance, -guard):

@@ -169,6 +169,8 @@ def test_quarantine_is_handed_on_as_a_file(shop: Shop) -> None:
         assert shop.admin.get(f"{file}?format={form}").content.startswith(magic)
     measure = f"/quarantines/{made['id']}/parts/1/measure"
     shop.call("POST", measure, 422, measured=40.0075, reason="Micrometer")  # within the uncertainty of the limit
+    for other_unit in (1.5748, 40_000.5):  # a good part would be scrap for ever
+        assert "mm" in shop.call("POST", measure, 422, measured=other_unit, reason="Micrometer")["detail"]
     report = shop.call("GET", f"/characteristics/{shop.characteristic}/report.json?section=quarantine&last=all")
     assert "SN-0006" in str(report)
 

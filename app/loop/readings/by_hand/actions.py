@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from sqlalchemy.orm import Session
 
 from app.access.audit.actions import record
+from app.core.plausibility import looks_like_inches
 from app.db.events import publish
 from app.errors import FieldError, Invalid
 from app.language.i18n import _
@@ -17,6 +18,7 @@ from app.loop.tables.readings import HandMeasurement
 from app.web.forms import length, parsed
 
 FURTHEST = 10.0  # mm from the target; what lies further away was typed in another unit
+LEAST_IN_INCHES = 1.0  # mm; a smaller target and its 25th part can both be meant
 
 
 @dataclass(frozen=True)
@@ -26,6 +28,18 @@ class HandResult:
     measured: float | None
     good: bool | None
     comment: str | None = None
+
+
+def must_be_mm(field: str, measured: float, target: float) -> None:
+    """Raise `Invalid` for a size that was typed in another unit: no part is off by so much, and what follows is for ever."""
+    values = {"measured": measured, "furthest": FURTHEST, "target": target}
+    if abs(target) >= LEAST_IN_INCHES and looks_like_inches(measured, target):
+        message = _("{measured:g} mm looks like {target:g} mm in inches")
+    elif abs(measured - target) > FURTHEST:
+        message = _("{measured:g} mm lies more than {furthest:g} mm from the target {target:g} mm")
+    else:
+        return
+    raise Invalid.at(field, message.format(**values), do=_("Sizes are in mm, with a decimal point."))
 
 
 def measure(
@@ -54,14 +68,8 @@ def measure(
     target = characteristics.parameters_of(
         session, entry.machine_id, entry.characteristic_id, reading.parameters_version
     ).target
-    if result.measured is not None and abs(result.measured - target) > FURTHEST:
-        raise Invalid.at(
-            size,
-            _("{measured:g} mm lies more than {furthest:g} mm from the target {target:g} mm").format(
-                measured=result.measured, furthest=FURTHEST, target=target
-            ),
-            do=_("Sizes are in mm, with a decimal point."),
-        )
+    if result.measured is not None:
+        must_be_mm(size, result.measured, target)
     measurement = HandMeasurement(
         machine_id=entry.machine_id,
         characteristic_id=entry.characteristic_id,
