@@ -23,6 +23,7 @@ from sqlalchemy.orm import Session
 
 from app.access.audit.actions import record
 from app.access.callers import Caller
+from app.core.plausibility import offset_warnings
 from app.db.events import publish
 from app.errors import Conflict, FieldError, Invalid
 from app.language.i18n import _
@@ -176,6 +177,7 @@ def _tool_replaced(session: Session, row: AlarmRow, comment: str, caller: Caller
     tool = tool_queries.tool(session, machine, alarm.tool_memory)
     if offset is None and tool.changed_at is not None and tool.changed_at >= alarm.last_at:
         return [{"code": "tool_changed_already", "tool": tool.number, "at": tool.changed_at.isoformat()}]
+    before = tool.offset
     done = tool_actions.change_tool(
         session, machine, alarm.tool_memory, NO_OFFSET if offset is None else offset, comment, caller
     )
@@ -184,6 +186,8 @@ def _tool_replaced(session: Session, row: AlarmRow, comment: str, caller: Caller
     ]
     if offset is None:
         outcome.append({"code": "offset_assumed", "tool": tool.number, "offset": done.tool.offset})
+    else:
+        outcome += _far(before, offset)
     if done.superseded:
         outcome.append({"code": "corrections_superseded", "numbers": done.superseded})
     if done.averages:
@@ -265,17 +269,23 @@ def _offset_set(
     tool = tool_queries.tool(session, row.machine, number)
     if offset is None and tool.reset_at is not None and tool.reset_at >= row.alarm.last_at:
         return [{"code": "offset_told_already", "tool": number, "offset": tool.offset}]
-    true = tool.offset if offset is None else offset
+    before, true = tool.offset, tool.offset if offset is None else offset
     reason = comment if changed_by is None else _("{who}: {why}").format(who=changed_by, why=comment)
     done = tool_actions.edit_tool(session, row.machine, number, true, reason, caller)
     outcome: Outcome = [{"code": "offset_set", "tool": number, "offset": done.tool.offset}]
     if changed_by is not None:
         outcome[0]["changed_by"] = changed_by
+    outcome += _far(before, true)
     if done.superseded:
         outcome.append({"code": "corrections_superseded", "numbers": done.superseded})
     if done.averages:
         outcome.append({"code": "averages_restarted", "locations": done.averages})
     return outcome
+
+
+def _far(before: float, offset: float) -> Outcome:
+    """Ask about the unit of an offset that lies far from the one before."""
+    return [{"code": "offset_far", "before": before, "offset": offset} for _warning in offset_warnings(before, offset)]
 
 
 def _noted(session: Session, row: AlarmRow, comment: str, caller: Caller) -> Outcome:

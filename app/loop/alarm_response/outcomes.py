@@ -52,6 +52,9 @@ def _followed(item: dict[str, Any]) -> str:
             )
         case "offset_assumed":
             text = _("No offset was entered; {offset} is assumed.")
+        case "offset_far":
+            text = _("It was {before}, and is {offset} now. Offsets are typed in mm: is it µm, or inches?")
+            values["before"] = mm(item["before"])
         case "tool_changed_already":
             text = _("Tool {tool} had been changed since, so nothing was restarted a second time.")
         case "corrections_superseded":

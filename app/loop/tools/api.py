@@ -100,8 +100,10 @@ def change_tool(
     until somebody acknowledges them.
     """
     machine_row = machine_for(session, caller, machine, "operator")
+    before = queries.tool(session, machine_row, tool).offset
     done = actions.change_tool(session, machine_row, tool, change.offset, change.reason, caller)
-    return tool_set(queries.tools(session, machine_row, only=tool)[0], machine_row.key, done.superseded)
+    warnings = offset_warnings(before, change.offset)
+    return tool_set(queries.tools(session, machine_row, only=tool)[0], machine_row.key, done.superseded, warnings)
 
 
 @router.post("/machines/{machine}/tools/{tool}/reported", responses=problems(404))

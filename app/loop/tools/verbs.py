@@ -241,14 +241,21 @@ def _falling(on: OfTool) -> list[str]:
 
 
 def _edit(on: OfTool, edit: ToolEdit) -> Said:
-    warnings = offset_warnings(on.row.tool.offset, edit.offset)
+    before = on.row.tool.offset
     actions.edit_tool(on.session, on.machine, on.number, edit.offset, edit.reason, on.caller)
-    codes = ({"offset_step": "edit-far"}.get(warning.code, "edit-inches") for warning in warnings)
-    return Said(next(codes, "edit"), on.number)
+    return Said(_far(before, edit.offset) or "edit", on.number)
 
 
-def _change(on: OfTool, change: ToolChange) -> None:
+def _change(on: OfTool, change: ToolChange) -> Said:
+    before = on.row.tool.offset
     actions.change_tool(on.session, on.machine, on.number, change.offset, change.reason, on.caller)
+    return Said(_far(before, change.offset) or "change", on.number)
+
+
+def _far(before: float, after: float) -> str | None:
+    """The message where an offset that was set may be in another unit."""
+    codes = ({"offset_step": "edit-far"}.get(warning.code, "edit-inches") for warning in offset_warnings(before, after))
+    return next(codes, None)
 
 
 def _switch(on: OfTool, why: SisterIn) -> Said:

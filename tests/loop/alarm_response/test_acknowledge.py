@@ -108,6 +108,13 @@ class TestToolReplaced:
         (alarm,) = shop.alarms()
         assert codes(shop.acknowledge(alarm["id"], "tool_replaced"))[0] == "tool_restarted"
 
+    def test_an_offset_in_another_unit_is_asked_about(self, shop: Shop) -> None:
+        shop.read(350.0)
+        (alarm,) = shop.alarms()
+        done = shop.acknowledge(alarm["id"], "tool_replaced", offset=50.0)
+        assert codes(done)[:2] == ["tool_restarted", "offset_far"]
+        assert "is it µm" in done["outcome"][1]["text"]
+
     def test_not_without_a_tool(self, shop: Shop) -> None:
         shop.add(f"{shop.characteristic}-m", tool_memory=0)
         shop.read(20.0, f"{shop.characteristic}-m")

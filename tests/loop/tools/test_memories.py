@@ -196,6 +196,8 @@ def test_an_offset_and_an_empirical_value_typed_in_micrometres_are_warned_of(sho
     assert told["offset"] == 400
     told = shop.call("PUT", tool, offset=15.748, reason="typed from an inch table")
     assert [(each["code"], each["field"]) for each in told["warnings"]] == [("looks_like_inches", "offset")]
+    told = shop.call("POST", f"{tool}/change", offset=400, reason="new insert")
+    assert [(each["code"], each["field"]) for each in told["warnings"]] == [("offset_step", "offset")]
     assert shop.call("PUT", average, empirical_value=0.0026, reason="CMM")["warnings"] == []
     assert (
         shop.call("PUT", average, empirical_value=2.6, reason="CMM")["warnings"][0]["code"] == "empirical_value_large"
