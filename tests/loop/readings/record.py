@@ -60,9 +60,9 @@ BROKEN = (
        WHERE (s.last_measured, s.last_deviation, s.last_average, s.last_zone, s.last_received_at)
            IS DISTINCT FROM (r.measured, r.deviation, r.average_after, r.zone, r.received_at)
            AND r.code <> 'imported'""",  # history may be older than the state
-    """SELECT s.characteristic_id, s.last_measured_at, max(r.measured_at) FROM stream s JOIN reading r
+    """SELECT s.characteristic_id, s.last_measured_at, max(least(r.measured_at, r.received_at)) FROM stream s JOIN reading r
            ON r.machine_id = s.machine_id AND r.characteristic_id = s.characteristic_id
-       GROUP BY s.machine_id, s.characteristic_id HAVING s.last_measured_at <> max(r.measured_at)""",
+       GROUP BY s.machine_id, s.characteristic_id HAVING s.last_measured_at <> max(least(r.measured_at, r.received_at))""",
     "SELECT * FROM reading r LEFT JOIN stream s USING (machine_id, characteristic_id) WHERE s.sequence IS NULL",
     # a key names one reading
     "SELECT characteristic_id, key FROM reading WHERE key IS NOT NULL GROUP BY 1, 2 HAVING count(*) > 1",

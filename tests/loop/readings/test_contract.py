@@ -371,6 +371,14 @@ class TestTimes:
         assert [item["sequence"] for item in items] == [1, 2, 3]
         assert [item["late"] for item in items] == [False, True, False]
 
+    def test_a_clock_that_was_ahead_makes_no_later_reading_late(self, shop: Shop) -> None:
+        now = datetime.now(UTC)
+        ahead = [shop.read(0.0, measured_at=(now + timedelta(hours=20, minutes=m)).isoformat()) for m in (0, 1)]
+        batch = shop.push([0.0, 0.0], answers=True)
+        right = shop.read(0.0, measured_at=datetime.now(UTC).isoformat())
+        late = shop.read(0.0, measured_at=(now - timedelta(hours=1)).isoformat())
+        assert [reading["late"] for reading in (*ahead, *batch, right, late)] == [False] * 5 + [True]
+
     def test_without_a_time_a_reading_was_measured_when_it_came(self, shop: Shop) -> None:
         answer = shop.read(0.0)
         assert answer["measured_at"] == answer["received_at"]

@@ -112,7 +112,7 @@ WHERE s.results IS NOT NULL
 MOVE_STREAM = """
 UPDATE stream t SET sequence = t.sequence + %(count)s, sequence_at_tool_change = t.sequence_at_tool_change + %(count)s,
     last_average = coalesce(t.last_average, 0),
-    last_measured_at = greatest(t.last_measured_at, n.measured_at),
+    last_measured_at = greatest(t.last_measured_at, least(n.measured_at, %(now)s)),
     last_measured = CASE WHEN newer THEN n.measured ELSE t.last_measured END,
     last_deviation = CASE WHEN newer THEN n.deviation ELSE t.last_deviation END,
     last_zone = CASE WHEN newer THEN n.zone ELSE t.last_zone END,

@@ -140,13 +140,13 @@ class ColumnarReadings:
         self._effects.append(effect)
 
     def _latest_before(self) -> NDArray[np.int64]:
-        """Return for each reading the latest time of measurement in its stream before it."""
+        """Return for each reading the latest time of measurement in its stream before it, none after it was received."""
         latest = np.empty(len(self.readings), np.int64)
+        times = np.minimum(self._times, moment(self.now))
         for index, stream in self._streams.values():
             of_stream = self._stream_of == index
             first = NEVER if stream.last_measured_at is None else moment(stream.last_measured_at)
-            times = np.concatenate(([first], self._times[of_stream]))
-            latest[of_stream] = np.maximum.accumulate(times)[:-1]
+            latest[of_stream] = np.maximum.accumulate(np.concatenate(([first], times[of_stream])))[:-1]
         return latest
 
     def run(self, at: int) -> int:
@@ -213,7 +213,8 @@ class ColumnarReadings:
             last = int(np.flatnonzero(self._stream_of == index)[-1])
             if self._quiet[last]:
                 stream.last = self.verdict(last)
-                stream.last_measured_at = EPOCH + int(max(self._latest[last], self._times[last])) * MICROSECOND
+                latest = max(int(self._latest[last]), min(int(self._times[last]), moment(self.now)))
+                stream.last_measured_at = EPOCH + latest * MICROSECOND
 
     def streams(self) -> list[PendingStream]:
         """Return the streams of the batch."""

@@ -167,7 +167,7 @@ def _move_along(verdict: Verdict, course: float | None, *, jump: bool) -> None:
         stream.paused_by = next(alarm for alarm in verdict.alarms if alarm.kind == ReadingAlarm.PROBE_FAULT.value)
     if verdict.late:
         return
-    stream.last_measured_at = verdict.measured_at
+    stream.last_measured_at = min(verdict.measured_at, verdict.received_at)  # a fast clock makes no later reading late
     if not jump:
         remember(stream, verdict.sequence, decision, verdict.compensated)
         if course is not None and not stops:

@@ -146,10 +146,19 @@ def test_with_nothing_confirmed_the_corrections_never_add_up_beyond_what_was_see
 
 def test_late_is_what_was_measured_before_the_newest_of_all() -> None:
     pending = pending_writes()
-    minutes = [60, 0, 30, 60, 61]
+    minutes = [-1, -61, -31, -1, 0]
     decided(pending, [ReadingIn("shaft", measured=40.0, measured_at=NOW + timedelta(minutes=each)) for each in minutes])
     assert [verdict.late for verdict in pending.verdicts] == [False, True, True, False, False]
-    assert pending.stream(1).last_measured_at == NOW + timedelta(minutes=61)
+    assert pending.stream(1).last_measured_at == NOW
+
+
+def test_a_reading_from_the_future_makes_no_later_one_late() -> None:
+    pending = pending_writes()
+    minutes = [60, 0, 61, -1, None]
+    times = [None if each is None else NOW + timedelta(minutes=each) for each in minutes]
+    decided(pending, [ReadingIn("shaft", measured=40.0, measured_at=time) for time in times])
+    assert [verdict.late for verdict in pending.verdicts] == [False, False, False, True, False]
+    assert pending.stream(1).last_measured_at == NOW
 
 
 def test_a_key_that_is_known_is_compared_by_value_only() -> None:
