@@ -27,13 +27,17 @@ assert tuple(LENGTHS) == get_args(Unit)
 _WORDS: Final[dict[str, str]] = {
     word: unit
     for unit, words in {
-        "mm": "mm millimeter millimeters millimetre millimetres millimetri мм миллиметр 毫米",
-        "um": "µm um mikrometer micrometer micrometers micrometre micrometres micron microns mikron mkm мкм микрон",
+        "mm": "mm millimeter millimeters millimetern millimetre millimetres millimetri milimetar milimetara milimetri milimetrih "
+        "мм миллиметр миллиметры миллиметрах милиметар 毫米 ミリ",
+        "um": "µm um mikrometer mikrometern micrometer micrometers micrometre micrometres micron microns mikron mikrona mikroni mikronen "
+        "mikronima mikronih mikrometar mikrometara mikrometri mikrometrov mikrometrih micromètre micromètres mkm мкм микрон микроны "
+        "микронах микрона микронима микрометр микрометры микрометрах 微米",
         "nm": "nm nanometer nanometre",
         "cm": "cm centimeter centimetre zentimeter см",
         "m": "m meter metre м",
-        "inch": "in inch inches zoll дюйм \" ''",
-        "mil": "mil mils thou thous",
+        "inch": "in in. ins inch inches zoll inč inča inči inčima pouce pouces pollice pollici pulgada pulgadas pulg дюйм дюйма дюймы дюймов "
+        "дюймах инч инча инчи инчима 英寸 インチ \" '' ″ ”",
+        "mil": "mil mils thou thous thou. milliinch",
         "tenth": "tenth tenths",
         "uin": "µin uin µinch uinch microinch microinches",
     }.items()
@@ -53,27 +57,58 @@ _LAST_WORD: Final = re.compile(r"[_ ]([^_ ]+)$")
 _OTHER_SCALES: Final = {"f", "fahrenheit", "k", "kelvin", "r", "rankine", "℉"}
 _WORDS_OF: Final = re.compile(r"[^\W\d_]+")
 _UNMISTAKABLE: Final = frozenset(
-    ["mm", "µm", "inch", "inches", "zoll", "micron", "microns", "thou", "thous", "дюйм", "мм", "мкм"]
-    + ["microinch", "microinches", "uinch", "µinch", "millimeter", "millimetre"]
+    ["mm", "µm", "мм", "мкм", "毫米", "微米", "英寸", "インチ"]
+    + [
+        word
+        for word, unit in _WORDS.items()
+        if len(word) > 3 and unit in {"mm", "um", "inch", "mil", "uin"} and word not in {"micrometer", "mikrometer"}
+    ]
 )
-"""Words that mean a unit wherever they stand in a name. Others do at its end only: *um* is a German word, *in* an English one."""
-_AT_END: Final = re.compile(r"(?:[_,;/ ]|(?<=\d))(mm|MM|[uµμ]m|nm|cm|mils?|tenths?|[uµμ]in)$", re.IGNORECASE)
-_INCHES_AT_END: Final = re.compile(r"""(?:[_,;/] ?|(?<=\d) ?)(in\.?|"|'')$""", re.IGNORECASE)
+"""Words that mean a unit wherever they stand in a name; a micrometer is a gauge as well. Others do at its end only: *um* is a German word, *in* an English one."""
+_AT_END: Final = re.compile(r"(?:[-_,;/ .:=|]|(?<=\d))(mm|MM|[uµμ]m|nm|cm|mils?|tenths?|[uµμ]in)$", re.IGNORECASE)
+_INCHES_AT_END: Final = re.compile(r"""(?:[_,;/:=|] ?|(?<=\d) ?)(in\.?|["″”]|'')$|(?<=\s)(["″”]|'')$""", re.IGNORECASE)
 _CAPITAL_WITHIN: Final = re.compile(r"(?<=[a-zß-ÿ])(?=[A-ZА-Я])")
-_SCALED: Final = re.compile(
-    r"""1\s*/\s*10+\s*(?:mm|[uµμ]m|in|inch|inches|zoll|")(?!\w)|(?:\b(?:in|u|v|в|у)\s+|[\[(=:]\s*)\d+(?:[.,]\d+)?\s*(?:mm|[uµμ]m|in|inch|inches|zoll)(?!\w)"""
-    r"""|\b(?:mm|inch|in)\s*(?:/|\*|x|×)\s*10+\b|\b(?:ten|hundredths?)[- ]?thou(?:sandths?)?s?\b"""
-    r"""|\b(?:thousandths|hundredths|tausendstel|hundertstel|zehntel)\b""",
+_WIDE: Final = str.maketrans("（）【】［］「」{}«»：，", "()[][][]()():,")
+"""Brackets of other scripts, and such as set theory has, as those that are known."""
+_QUOTED: Final = re.compile(r"[“\"'‘]([^“\"'‘”’]+)[”\"'’]")
+_OF_A_UNIT: Final = re.compile(
+    r"(?<!\w)(?:(micro[- ]?|mikro[- ]?|[uµμ]-?)|milli[- ]?)(?:inch(?:es)?|in|zoll|[\"″”])(?!\w)|\b(micro|mikro|milli)[- ]met(?:er|re)s?\b",
     re.IGNORECASE,
 )
+"""A unit in two words or with a mark, such as *micro inch* or *µ"*."""
+_LENGTH: Final = r"""(?:mm|[uµμ]m|inch(?:es)?|in|zoll|["″])"""
+_PART: Final = rf"""1\s*/\s*10+\s*{_LENGTH}(?!\w)|[\[(]\s*1\s*/\s*10+\s*[\])]|\b{_LENGTH}\s*(?:/|\*|x|×|·)\s*10+\b
+|\b1?e-\d+\s*{_LENGTH}(?!\w)|\b{_LENGTH}\s*e-\d|\b10+\s*ths?\b
+|\b(?:ten|hundredths?)[- ]?thou(?:sandths?)?s?\b|\btenths?\s+(?:of\s+)?(?:an?\s+)?(?:mm|thou|mil|micron|inch)
+|\b(?:thousandths?|hundredths?|tausendstel|hundertstel|zehntel|hiljadit\w+|stotink\w+|tisočink\w+|тысячн\w+|[mc]illièmes?|centièmes?|dixièmes?)\b"""
+_PARTS_OF: Final = re.compile(_PART, re.IGNORECASE | re.VERBOSE)
 """Such as *1/1000 mm*: sizes counted in parts or multiples of a unit."""
+_SCALED: Final = re.compile(
+    _PART
+    + rf"""|(?:\b(?:in|u|v|в|у)\s+|[\[(=:]\s*)\d+(?:[.,]\d+)?\s*{_LENGTH}(?!\w)
+    |(?<![\d.,±])(?<!±\s)(?:0?[.,]0*1\s*(?:inch|in|["″])|0?[.,]001\s*mm)(?!\w)|(?<!\d\s)(?<=[\s(\[_])[x×*]\s?10{{2,}}\b|\b10\s*(?:\^|⁻)
+    |\b{_LENGTH}\s*(?:\^\s*[23]|[²³])|\b{_LENGTH}\s*/\s*(?:s|min|rev|h|mm?|K|°C)\b|\bsq\.?\s*(?:mm|in)\b
+    |\b{_LENGTH}\s*(?:or|oder|ili|ou|[,/|])\s*{_LENGTH}(?!\w)""",
+    re.IGNORECASE | re.VERBOSE,
+)
+"""The same in a name, and what is no length or either of two: *mm²*, *mm/min*, *mm or in*."""
 _TOLERANCE: Final = re.compile(r"(?<![\w.,])\d+(?:[.,]\d+)?\s*(?:[uµμ]m|microns?)(?!\w)")
 """Such as the 5 µm of *Run-out 5 µm*, a tolerance rather than the unit of the sizes."""
+_OTHERS: Final = frozenset(
+    re.findall(
+        r"\S+",
+        """ft foot feet fuß fuss pied pieds yd yard yards dm decimeter decimeters decimetre decimetres furlong furlongs fathom fathoms mile
+    miles km angstrom angstroms px pixel pixels counts micrometer mikrometer µ μ mu my col cola palec imperial english customary
+    thousandths tenths nm kn ncm ° º deg °c ℃ % ‰ rpm psi""",
+    )
+)
+"""Words of units that are not known, of none of length, or of whole systems; at the end of a name and in brackets."""
+_OTHER_SYSTEMS: Final = _OTHERS - OTHER_UNITS - {"my", "col", "counts"}
 _OTHER_AT_END: Final = re.compile(
-    r"(?:(?:[_,;/ ]|(?<=\d))(ft|feet|yd|yards|dm|decimet(?:er|re)s?|[µμ])|(?<=[\w)] )(in\.?)|[-.](in|ft))$",
+    rf"(?:[-_,;/ .:=|]|(?<=\d))({'|'.join(map(re.escape, sorted(_OTHERS)))})$|(?<=\S[ .-])(in\.?|ins)$|^(um|mils?|in(?=_[a-z]?\d))_",
     re.IGNORECASE,
 )
-"""Lengths that are not known, and *in* where it may be inches as well as a word: *Bore in*."""
+"""Those, and *in* where it may be inches as well as a word: *Bore in*."""
 _AXES: Final = frozenset("xyzuvwijkrdlpt")
 """Letters in square brackets that say which size it is: *CIR1 [X]*."""
 _NO_UNITS: Final = (
@@ -136,9 +171,8 @@ def unit_of_name(name: str, said: str | None = None) -> str | None:
         word = error.word.lower()
         if said and not (
             word in OTHER_UNITS
-            or _OTHER_TITLE.fullmatch(word)
-            or "," in word
-            or any(map(str.isdigit, word))
+            or word in _OTHERS
+            or any(sign in ",/*×" or sign.isdigit() for sign in word)
             or "thou" in word
         ):
             return None
@@ -160,8 +194,9 @@ def unit_in(header: str) -> str | None:
         ...
     app.files.formats.units.UnknownUnit: furlong
     """
-    if match := _SCALED.search(header[:LONGEST_SIZE]) or _TOLERANCE.search(header[:LONGEST_SIZE]):
-        raise UnknownUnit(match[0].strip(" [(=:"))
+    header = _in_one_word(header[:LONGEST_SIZE].translate(_WIDE))
+    if match := _SCALED.search(header) or _TOLERANCE.search(header):
+        raise UnknownUnit(match[0].strip(" [(=:])"))
     unknown = None
     for square, round_, angle in _BRACKETS.findall(header):
         word = (square or round_ or angle).strip()
@@ -171,7 +206,7 @@ def unit_in(header: str) -> str | None:
             unknown = unknown or word
     if unknown is not None:
         raise UnknownUnit(unknown)
-    header = header[:LONGEST_SIZE].strip()
+    header = _CAPITAL_WITHIN.sub(" ", header.strip())
     if (match := _AT_END.search(header)) and (unit := length_unit(match[1])):
         return unit
     if _INCHES_AT_END.search(header):
@@ -182,6 +217,18 @@ def unit_in(header: str) -> str | None:
     if not named and (match := _OTHER_AT_END.search(header)):
         raise UnknownUnit(match[1] or match[2] or match[3])
     return length_unit(named[0]) if named else None
+
+
+def _in_one_word(name: str) -> str:
+    """A name with its unit as one word, without quotation marks: *D40 'micro inch'* as *D40 microinch*."""
+
+    def word(match: re.Match[str]) -> str:
+        if match[2]:
+            return "mm" if match[2].lower() == "milli" else "micron"
+        return "microinch" if match[1] else "milliinch"
+
+    name = _QUOTED.sub(lambda match: f"({match[1]})" if length_unit(match[1]) else match[0], name)
+    return _OF_A_UNIT.sub(word, name)
 
 
 def _unmistakable(text: str) -> list[str]:
@@ -250,20 +297,28 @@ def beside(row: Mapping[Any, Any], field: Literal["unit", "nominal"]) -> Any:
 
 
 _TITLE: Final = re.compile(
-    r"\b(?:units?|einheit(?:en)?|jedinic[ae]|enot[ae]|единица|јединица)\s*[=:]\s*([^\s;,]+)", re.IGNORECASE
+    r"\b(?:units?(?:\s+of\s+measure(?:ment)?)?|uom|(?:ma(?:ß|ss)|längen)?einheit(?:en)?|jedinic[ae]|enot[ae]|unités?|unità|unidad(?:es)?"
+    r"|единицы?|јединица|单位|単位)\s*[=:]\s*([^\s;,]+)",
+    re.IGNORECASE,
 )
 _SIZES_IN: Final = re.compile(
     r"\b(?:all|dims?|dimensions?|sizes?|values?|measurements?|lengths?|results?|readings?|units?|ma(?:ß|ss)e?|werte?|messwerte?"
-    r"|angaben|längen|alle|mere|mera|vrednosti|dimenzije|rezultati|размеры|значения|мере|вредности)\b"
-    r"[^;|]{0,60}?(?:\b(?:in|are|sind|u|v|в|у|su|so)\b\s*|[:=]\s*)([^\s;,/]+)(?![^\s;,.)])",
+    r"|angaben|längen|alle|mere|mera|vrednosti|dimenzije|rezultati|cotes?|valeurs|размеры|значения|мере|вредности)\b"
+    r"[^;|]{0,60}?(?:\b(?:in|are|sind|en|u|v|в|у|su|so)\b\s*|[:=]\s*)([^\s;,/]+)(?![^\s;,.)])",
     re.IGNORECASE,
 )
+_SYSTEM: Final = re.compile(
+    r"\b(imperial|english|customary)\s+(?:units?|system|measure)|\bu\.?s\.?\s+(customary)\b", re.IGNORECASE
+)
+_UNIT_OF: Final = re.compile(
+    rf"\b(?:in|u|v|в|у|en|units?|einheit(?:en)?|jedinica)\s*[:=]?\s*(?:0?[.,]0*1\s*{_LENGTH}(?!\w)|10\s*(?:\^|⁻))"
+    r"|\b(?:values?|sizes?|ma(?:ß|ss)e|werte|all)\b[^;|\d]{0,20}[x×*]\s?10{2,}\b",
+    re.IGNORECASE,
+)
+"""Such as *values in 0.001 mm*; a resolution or a tolerance is none."""
 _ALONE: Final = re.compile(r"[\[(<]\s*([^\s\[\]()<>]{1,12})\s*[\])>]")
 _QUANTITY: Final = re.compile(r"\d\s*[^\W\d_]+")
 """Such as the 2 µm of an uncertainty: that is no unit of the table."""
-_OTHER_TITLE: Final = re.compile(
-    r"(?:ft|feet|yd|yards|dm|furlongs?|imperial|thousandths|tenths|[µμ])\.?", re.IGNORECASE
-)
 _ABBREVIATED, _NAME_AND_VALUE = 2, 2
 
 
@@ -284,15 +339,16 @@ def unit_above(titles: Iterable[Sequence[str]]) -> str | None:
     """
     said, mentioned, scaled = dict[str, None](), list[str](), list[str]()
     for cells in titles:
-        filled = [cell.strip()[:LONGEST_SIZE] for cell in cells if cell.strip()]
+        filled = [cell.strip()[:LONGEST_SIZE].translate(_WIDE) for cell in cells if cell.strip()]
         for at, cell in enumerate(filled):
             words = filled[at + 1 : at + 2] if is_unit_column(cell.rstrip(":= ")) else []
             words += [*_TITLE.findall(cell), *_SIZES_IN.findall(cell)]
             if len(filled) == 1:  # a title; in a row of several cells it may be of one column
                 words += [*_ALONE.findall(cell), cell if len(cell) > _ABBREVIATED else ""]
             said |= {unit: None for word in words if (unit := length_unit(word.rstrip(".")))}
-            mentioned += [word for word in words if _OTHER_TITLE.fullmatch(word)]
-            scaled += [match[0] for match in _SCALED.finditer(cell)]
+            mentioned += [word for word in words if word.lower().rstrip(".") in _OTHER_SYSTEMS]
+            mentioned += [match[1] or match[2] for match in _SYSTEM.finditer(cell)]
+            scaled += [match[0] for form in (_PARTS_OF, _UNIT_OF) for match in form.finditer(cell)]
             mentioned += _unmistakable(_QUANTITY.sub("", cell)) if len(filled) <= _NAME_AND_VALUE else []
     if scaled:
         raise UnknownUnit(", ".join(dict.fromkeys(scaled)))
@@ -315,4 +371,4 @@ def like_a_unit(word: str, *, least_doubt: bool = False) -> bool:
     """Tell of a word that may be a unit. least_doubt: it stands where units stand."""
     if not word or any(sign.isdigit() for sign in word) or len(word.split()) > 1:
         return False
-    return least_doubt or (len(word) <= 4 and word.lower() not in _NO_UNITS)
+    return least_doubt or word.lower() in _OTHERS or (len(word) <= 4 and word.lower() not in _NO_UNITS)

@@ -2,7 +2,7 @@
 
 import pytest
 
-from app.files.formats.units import LENGTHS, UnknownUnit, length_unit, unit_in
+from app.files.formats.units import LENGTHS, UnknownUnit, length_unit, unit_above, unit_in
 
 
 @pytest.mark.parametrize(
@@ -30,6 +30,11 @@ def test_what_is_no_length_is_none(word: str) -> None:
     [
         ("Run-out [mil]", "mil"), ("Run-out (thou)", "thou"), ("D40 (in)", "inch"), ("Ø [mm]", "mm"), ("D [A] (µm)", "um"), ("Wert_um", "um"),
         ("Deviation (X)", None), ("Diameter (actual)", None), ("D40 (D12)", None), ("Value", None), ("minimum", None), ("Werte [1]", None),
+        ("Size {in}", "in"), ("Actual «in»", "in"), ("寸法（インチ）", "in"), ('Maß "', "in"), ("Maß ″", "in"), ("D40 'in'", "in"), ("D40 [in.]", "in"),
+        ("D40:in", "in"), ("Diamètre (pouces)", "in"), ("Prečnik u inčima", "in"), ("Диаметр в дюймах", "in"), ("Prečnik (mikrona)", "um"),
+        ("BoreUm", "um"), ("D40-um", "um"), ("D40 mikron", "um"), ("D40 micro meter", "um"), ("valueMils", "mil"), ("D40 milli inch", "mil"),
+        ("Ra micro inch", "uin"), ('Ra µ"', "uin"), ("Ø 40 ±0,01 mm", "mm"), ("Flatness 0.01 mm", "mm"), ("M8x100", None), ("Bohrung E-3", None),
+        ("Micrometer reading", None), ("in_feed", None), ("Position in X", None), ("My size", None), ("Max100", None), ('Bore "top"', None),
     ],
 )  # fmt: skip
 def test_the_unit_of_a_header(header: str, unit: str | None) -> None:
@@ -37,8 +42,73 @@ def test_the_unit_of_a_header(header: str, unit: str | None) -> None:
 
 
 @pytest.mark.parametrize(
-    "header", ["Torque [Nm]", "Moment (Nm)", "Angle [°]", "Run-out [furlong]", "Share (%)", "D [M]", "Force (kN)"]
+    "header",
+    [
+        "Torque [Nm]",
+        "Moment (Nm)",
+        "Angle [°]",
+        "Run-out [furlong]",
+        "Share (%)",
+        "D [M]",
+        "Force (kN)",
+        "M8 Nm",
+        "Winkel °",
+    ]
+    + [
+        "BoreIn",
+        "D40 mu",
+        "20 my",
+        "in_D40",
+        "um_D40",
+        "Bore {furlong}",
+        "Bore (furlong)",
+        "Maß Fuß",
+        "Precnik col",
+        "Actual imperial",
+    ]
+    + [
+        "Maß [1/1000]",
+        "Dev [10^-3 mm]",
+        "Dev [E-3 mm]",
+        "0.0001in",
+        'Value .001"',
+        "Dev x1000",
+        "tenths of mm",
+        "10ths",
+        "Écart en centièmes",
+    ]
+    + ["Area [mm²]", "Area mm^2", "Feed mm/min", "Size (mm or in)", "Size mm/inch"],
 )
 def test_a_unit_that_is_no_length_is_never_taken_for_mm(header: str) -> None:
     with pytest.raises(UnknownUnit):
         unit_in(header)
+
+
+@pytest.mark.parametrize(
+    ("title", "unit"),
+    [
+        ("UOM: in", "in"), ("Maßeinheit: Zoll", "in"), ("Unité : pouce", "in"), ("Toutes les cotes en pouces", "in"), ("単位：インチ", "in"),
+        ("Mere u inčima", "in"), ("Language: English", None), ("Resolution: 0.001 mm", None), ("Probe diameter: 4 mm", None),
+        ("Magnification x100", None), ("All parts measured in my shop", None), ("Unit: A7", None), ("Units: metric", None),
+    ],
+)  # fmt: skip
+def test_the_unit_of_a_title(title: str, unit: str | None) -> None:
+    assert unit_above([[title]]) == (unit and length_unit(unit))
+
+
+@pytest.mark.parametrize(
+    "title",
+    [
+        "Imperial units",
+        "English units",
+        "Units: English",
+        "UNITS=ENGLISH",
+        "US customary",
+        "Values in 0.001 mm",
+        "Unit 0.001 mm",
+    ]
+    + ["All values x 1000", "Units: 10^-3 mm", "Lengths in µ"],
+)
+def test_a_title_in_doubt_is_never_taken_for_mm(title: str) -> None:
+    with pytest.raises(UnknownUnit):
+        unit_above([[title]])

@@ -196,6 +196,11 @@ TABLES = {
         THREE.replace("D40", "D40 ten-thou"), words="ten-thou", whole=True, column="D40 ten-thou"
     ),
     "in that may be inches": Case(THREE.replace("D40", "Bore in"), words="in", whole=True, column="Bore in"),
+    "braces": Case("Time,Size {in}\n2025-11-18 06:05,1.57480\n", morning(39.99992), column="Size {in}"),
+    "in within a word": Case(THREE.replace("D40", "BoreIn"), words="In", whole=True, column="BoreIn"),
+    "mu": Case(THREE.replace("D40", "D40 mu"), words="mu", whole=True, column="D40 mu"),
+    "an area": Case(THREE.replace("D40", "D40 [mm²]"), words="mm²", whole=True, column="D40 [mm²]"),
+    "a system of units": Case("Units: English\n" + THREE, words="English", whole=True),
     "feet": Case(THREE.replace("D40", "D40_ft"), words="ft", whole=True, column="D40_ft"),
     "a tolerance in the name": Case(THREE.replace("D40", "Bore 5 µm"), words="5 µm", whole=True, column="Bore 5 µm"),
     "microinches": Case(
@@ -400,7 +405,9 @@ def names_of(case: Case) -> tuple[list[str], str]:
     head = next(
         line
         for line in rows
-        if not line.startswith(("Plate", "Date:", "Job", "Unit:", "Report", "All ", "Alle ", "ALL", "Tolerances"))
+        if not line.startswith(
+            ("Plate", "Date:", "Job", "Unit:", "Report", "All ", "Alle ", "ALL", "Tolerances", "Units")
+        )
     )
     cells = [cell.strip().strip('"') for cell in re.split(r"[;,\t]| {2,}", head.strip())]
     return cells, case.column or next(each for each in cells if each in {"D40", "Wert", "Value", "Measured", "Istmaß"})
