@@ -9,18 +9,31 @@ from sqlalchemy.orm import Session
 from app.loop.characteristics.queries import CurrentCharacteristic
 from app.loop.tables.characteristics import Characteristic
 from app.loop.tables.machines import Machine
+from app.loop.tables.readings import Stream
 from app.loop.tables.tools import OPEN, Correction
 
 
 def open_corrections(
-    session: Session, machine: Machine, tool_memory: int | None = None, characteristic: Characteristic | None = None
+    session: Session,
+    machine: Machine,
+    tool_memory: int | None = None,
+    characteristic: Characteristic | None = None,
+    average_memory: int | None = None,
 ) -> Sequence[Correction]:
-    """Held, awaiting approval and pending ones, oldest first: of a tool, or by the readings of a characteristic."""
+    """Held, awaiting approval and pending ones, oldest first.
+
+    Of a tool, by the readings of a characteristic, or by those of the characteristics that use a location R11.
+    """
     query = select(Correction).where(Correction.machine_id == machine.id, Correction.status.in_(OPEN))
     if tool_memory is not None:
         query = query.where(Correction.tool_memory == tool_memory)
     if characteristic is not None:
         query = query.where(Correction.characteristic_id == characteristic.id)
+    if average_memory is not None:
+        on_it = select(Stream.characteristic_id).where(
+            Stream.machine_id == machine.id, Stream.average_memory == average_memory
+        )
+        query = query.where(Correction.characteristic_id.in_(on_it))
     return session.scalars(query.order_by(Correction.number).execution_options(populate_existing=True)).all()
 
 

@@ -13,7 +13,7 @@ from sqlalchemy.orm import Session
 
 from app.access.audit.actions import record
 from app.access.callers import Caller
-from app.core.decision.limits import Zone
+from app.core.decision.limits import Zone, nanometres
 from app.core.decision.step import rounded
 from app.db.events import publish
 from app.errors import Conflict
@@ -199,13 +199,19 @@ def set_empirical_value(
 ) -> AverageMemory:
     """Set what is taken off every measurement by the characteristics that use this location (R11); M begins again at 0.
 
+    Another one than before supersedes the open corrections of these characteristics: what the probe read too much is in them.
     Raises `NotFound`.
     """
     lock_machines(session, [machine.id])
+    now = datetime.now(UTC)
     memory = queries.average(session, machine, location)
     before = {"empirical_value": memory.empirical_value, "average": memory.average}
     memory.empirical_value = rounded(empirical_value)
-    restart_averages(session, machine, [location], datetime.now(UTC))
+    fallen: Sequence[Correction] = []
+    if nanometres(memory.empirical_value - before["empirical_value"]):
+        opened = open_corrections(session, machine, average_memory=location)
+        fallen = supersede(session, opened, now, caller.name, reason)
+    restart_averages(session, machine, [location], now)
     session.execute(
         update(Stream)
         .where(Stream.machine_id == machine.id, Stream.average_memory == location)
@@ -213,10 +219,15 @@ def set_empirical_value(
         .execution_options(synchronize_session=False)
     )
     session.refresh(memory)
-    after = {"empirical_value": memory.empirical_value, "average": memory.average}
+    after: dict[str, Any] = {"empirical_value": memory.empirical_value, "average": memory.average}
+    after |= {"superseded": [correction.number for correction in fallen]} if fallen else {}
     subject = f"average/{machine.key}/{location}"
     record(session, caller.name, "empirical value changed", subject, before, after, reason)
-    publish(session, average_changed(machine, location))
+    publish(
+        session,
+        average_changed(machine, location),
+        *(correction_changed(session, machine, correction) for correction in fallen),
+    )
     return memory
 
 

@@ -180,7 +180,11 @@ def get_average(session: SessionDep, caller: AnyCaller, machine: MachineKey, loc
 def set_empirical_value(
     session: SessionDep, caller: OperatorOrMachine, machine: MachineKey, location: R11, value: EmpiricalValueIn
 ) -> AverageSet:
-    """Set the empirical value; the running average begins again at 0."""
+    """Set the empirical value; the running average begins again at 0.
+
+    Another one than before supersedes the open corrections of the characteristics that use this location: they were computed
+    with it, and the next readings decide again.
+    """
     machine_row = machine_for(session, caller, machine, "operator")
     actions.set_empirical_value(session, machine_row, location, value.empirical_value, value.reason, caller)
     warnings = empirical_value_warnings(value.empirical_value)

@@ -10,6 +10,7 @@ from app.access.callers import Caller
 from app.core.plausibility import empirical_value_warnings, offset_warnings
 from app.language.i18n import _, ngettext
 from app.language.numbers import mm, typed_length, um
+from app.loop.characteristics.correction_queries import open_corrections
 from app.loop.tables.machines import Machine
 from app.loop.tools import actions, applying, queries, sister_actions, wording
 from app.loop.tools.actions import Decided
@@ -324,6 +325,11 @@ TOOL: tuple[Verb[OfTool, Any], ...] = (
 )
 
 
+def _computed_with_it(on: OfAverage) -> list[str]:
+    opened = open_corrections(on.session, on.machine, average_memory=on.number)
+    return [wording.will_fall_with_it([correction.number for correction in opened])] if opened else []
+
+
 def _set_empirical_value(on: OfAverage, value: EmpiricalValueIn) -> Said:
     actions.set_empirical_value(on.session, on.machine, on.number, value.empirical_value, value.reason, on.caller)
     return Said("average-large" if empirical_value_warnings(value.empirical_value) else "average", on.number)
@@ -339,6 +345,7 @@ AVERAGE: tuple[Verb[OfAverage, Any], ...] = (
         follows=lambda on: [
             _("It is taken off every measurement: machine reading minus true value."),
             _("The running average {average} begins at 0.").format(**on.values),
+            *_computed_with_it(on),
         ],
         reasons=lambda: [
             _("Compared with the measuring machine"),

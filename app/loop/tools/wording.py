@@ -156,6 +156,15 @@ def will_fall(numbers: list[int]) -> str:
     ).format(numbers=", ".join(map(str, numbers)))
 
 
+def will_fall_with_it(numbers: list[int]) -> str:
+    """Open corrections that will be superseded when the empirical value is changed."""
+    return ngettext(
+        "Correction {numbers} was computed with the empirical value until now and is dropped if that changes.",
+        "Corrections {numbers} were computed with the empirical value until now and are dropped if that changes.",
+        len(numbers),
+    ).format(numbers=", ".join(map(str, numbers)))
+
+
 def counted_on(numbers: list[int]) -> str | None:
     """Said when a correction is rejected on which later ones count."""
     if not numbers:

@@ -202,3 +202,17 @@ def test_an_offset_and_an_empirical_value_typed_in_micrometres_are_warned_of(sho
     assert (
         shop.call("PUT", average, empirical_value=2.6, reason="CMM")["warnings"][0]["code"] == "empirical_value_large"
     )
+
+
+@pytest.mark.parametrize("mode", ["automatic", "approval"])
+def test_another_empirical_value_supersedes_what_was_computed_with_the_old_one(shop: Shop, mode: str) -> None:
+    """A probe that reads 50 µm too much has asked for a correction that would now spoil the next part."""
+    other, shared = (shop.another("bore", mode=mode, tool_memory=tool, average_memory=tool) for tool in (4, 5))
+    numbers = [shop.read(50.0, key)["correction"]["number"] for key in (shop.characteristic, shared, other)]
+    shop.call("PUT", f"/machines/{shop.machine}/averages/5", empirical_value=0.0, reason="as before")
+    assert {shop.correction(number)["status"] for number in numbers} <= {"pending", "awaiting_approval"}
+    shop.call("PUT", f"/machines/{shop.machine}/averages/5", empirical_value=0.05, reason="ring")
+    fates = [shop.correction(number)["status"] for number in numbers]
+    assert fates == ["superseded", "superseded", "pending" if mode == "automatic" else "awaiting_approval"]
+    decided = shop.read(50.0)
+    assert (decided["decided_deviation"], decided["action"], decided["outstanding"]) == (0.0, "none", [])
