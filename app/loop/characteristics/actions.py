@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from typing import Any
 
-from sqlalchemy import func, update
+from sqlalchemy import func, select, update
 from sqlalchemy.orm import Session
 
 from app.access.audit.actions import record
@@ -291,7 +291,7 @@ def _change_parameters(
         _restart_average(session, machine.id, new.average_memory)
         changes.append({"kind": "average", "machine": machine.key, "average_memory": new.average_memory})
     before, after = _differences(old.as_dict(), new.as_dict())
-    if voids_corrections(old, new):
+    if voids_corrections(old, new) or _another_empirical_value(session, machine.id, old, new):
         fallen = supersede(
             session,
             open_corrections(session, machine, characteristic=characteristic),
@@ -303,6 +303,20 @@ def _change_parameters(
         after |= {"superseded": [correction.number for correction in fallen]} if fallen else {}
     record(session, actor, "parameters changed", f"characteristic/{characteristic.key}", before, after, reason)
     return now, changes
+
+
+def _another_empirical_value(session: Session, machine_id: int, old: Parameters, new: Parameters) -> bool:
+    """Tell if another location R11 takes another empirical value off: what the probe read too much is in corrections."""
+    if old.average_memory == new.average_memory:
+        return False
+    locations = (old.average_memory, new.average_memory)
+    values = session.scalars(
+        select(AverageMemory.empirical_value).where(
+            AverageMemory.machine_id == machine_id, AverageMemory.location.in_(locations)
+        )
+    ).all()
+    nothing = [0.0] * (len(locations) - len(values))  # R11 = 0, or a location that was never used
+    return len({nanometres(value) for value in (*values, *nothing)}) > 1
 
 
 def _keep_parts(session: Session, machine_id: int, tool_memory: int, parts: int) -> None:

@@ -48,6 +48,16 @@ def test_a_change_of_limits_leaves_a_correction(shop: Shop, parameters: dict[str
     assert shop.correction(number)["status"] == "pending"
 
 
+@pytest.mark.parametrize(("location", "fate"), [(7, "superseded"), (8, "pending"), (0, "pending")])
+def test_another_location_voids_a_correction_where_its_empirical_value_is_another(
+    shop: Shop, location: int, fate: str
+) -> None:
+    shop.call("PUT", f"/machines/{shop.machine}/averages/7", empirical_value=0.05, reason="ring")
+    number = shop.read(20)["correction"]["number"]
+    change(shop, {"average_memory": location})
+    assert shop.correction(number)["status"] == fate
+
+
 def test_another_tool_is_corrected_for_the_same_error_and_the_first_is_not(shop: Shop) -> None:
     first = shop.read(20)["correction"]
     change(shop, {"tool_memory": 4})
