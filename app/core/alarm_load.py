@@ -137,16 +137,6 @@ def load(moments: Iterable[datetime], begin: datetime, end: datetime) -> Load:
     )
 
 
-def is_stale(alarm: Annunciation, now: datetime) -> bool:
-    """Tell if an alarm that is active now has been so for more than 24 h.
-
-    >>> monday = datetime(2026, 3, 2)
-    >>> is_stale(Annunciation("a", monday), monday + STALE), is_stale(Annunciation("a", monday), monday + 2 * STALE)
-    (False, True)
-    """
-    return alarm.ended is None and now - alarm.at > STALE
-
-
 def chattering(alarms: Iterable[Annunciation]) -> set[Hashable]:
     """Causes that have happened three times or more in a minute.
 

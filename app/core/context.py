@@ -1,8 +1,6 @@
 """Circumstances of a reading by which readings differ: its order, its batch, its nest and others."""
 
-from collections.abc import Mapping
 from enum import StrEnum
-from typing import Any
 
 
 class ContextField(StrEnum):
@@ -29,12 +27,3 @@ def as_stored(chosen: Chosen) -> dict[str, str | int]:
     {'order': 'A-77', 'nest': 2}
     """
     return {field.value: int(value) if field is ContextField.NEST else value for field, value in chosen}
-
-
-def missing(context: Mapping[str, Any] | None, required: tuple[ContextField, ...]) -> list[ContextField]:
-    """The required fields that a context does not have. A nest 0 is a nest.
-
-    >>> [field.value for field in missing({"order": "A-77", "nest": 0}, (ContextField.ORDER, ContextField.NEST, ContextField.BATCH))]
-    ['batch']
-    """
-    return [field for field in required if (context or {}).get(field.value) is None]

@@ -29,7 +29,6 @@ SHORTEST_PAUSE, OF_USUAL = 10.0, 3.0
 
 NEXT = 5  # readings: the clock of one that is later than most of these ran ahead
 
-Flags = NDArray[np.bool_]
 Whole = NDArray[np.int64]
 
 

@@ -17,7 +17,6 @@ from app.core.alarm_load import (
     chattering,
     counts,
     floods,
-    is_stale,
     load,
     noisiest,
 )
@@ -65,9 +64,8 @@ def test_what_is_said_to_chatter_while_active_has_happened_three_times_in_a_minu
     assert bool(chattering(raised)) is truly
 
 
-def test_what_stays_is_stale_and_what_is_noisy_comes_first() -> None:
+def test_what_is_noisy_comes_first() -> None:
     alarms = [Annunciation("b", at(0), at(1)), Annunciation("a", at(2)), Annunciation("b", at(30), at(31))]
-    assert [is_stale(alarm, at(25 * 60)) for alarm in alarms] == [False, True, False]
     assert [(noise.cause, noise.alarms, noise.chatters) for noise in noisiest(alarms)] == [
         ("b", 2, False),
         ("a", 1, False),

@@ -12,8 +12,7 @@ from math import degrees, sqrt
 import numpy as np
 from numpy.typing import ArrayLike
 
-from app.core.geometry.plane import fit_plane
-from app.core.geometry.points import STRAIGHT, Degenerate, Floats, Reason, extents, frame, points_of, unit
+from app.core.geometry.points import STRAIGHT, Degenerate, Floats, Reason, extents, points_of
 
 LEAST_ARC = 30.0  # degrees: on a shorter arc the centre is thirty times less certain than a touch
 LARGEST = 1e4  # radii per extent of the points: as good as straight
@@ -40,23 +39,6 @@ class Circle:
     def range(self) -> float:
         """Roundness about the least-squares centre: greatest minus smallest radius, mm."""
         return float(np.ptp(self.residuals))
-
-
-@dataclass(frozen=True, eq=False, slots=True)
-class CircleInSpace:
-    """A circle in space, mm. radial: distances in its plane, positive outside; axial: out of its plane."""
-
-    centre: Floats
-    normal: Floats
-    radius: float
-    radial: Floats
-    axial: Floats
-    arc: float
-
-    @property
-    def rms(self) -> float:
-        """Root mean square of the distances, mm."""
-        return sqrt(float(np.mean(self.radial**2 + self.axial**2)))
 
 
 def fit_circle(points: ArrayLike, least_arc: float = LEAST_ARC) -> Circle:
@@ -99,60 +81,6 @@ def covered(away: Floats) -> float:
     angles = np.sort(np.arctan2(away[:, 1], away[:, 0]))
     gaps = np.diff(angles, append=angles[0] + 2 * np.pi)
     return degrees(2 * np.pi - float(gaps.max()))
-
-
-def fit_circle_in_space(points: ArrayLike, least_arc: float = LEAST_ARC) -> CircleInSpace:
-    """The least-squares circle through three points or more of space.
-
-    The squares of the distances in the circle's plane and out of it are minimised together, by Gauss and Newton, from
-    the circle in the least-squares plane. Raises `Degenerate` as `fit_circle` does.
-
-    >>> circle = fit_circle_in_space([(5, 0, 2), (0, 5, 2), (-5, 0, 2), (0, -5, 2)])
-    >>> circle.centre.round(9).tolist(), circle.normal.tolist(), round(circle.radius, 9)
-    ([0.0, 0.0, 2.0], [0.0, 0.0, 1.0], 5.0)
-    """
-    array = points_of(points, 3, 3)
-    plane = fit_plane(array)
-    axes = frame(plane.normal)
-    flat = fit_circle((array - plane.point) @ axes[:2].T, least_arc)
-    size = flat.radius
-    scaled = (array - plane.point) / size
-    centre, radius = axes[:2].T @ flat.centre / size, 1.0
-    best = np.inf
-    for _ in range(STEPS):
-        local = (scaled - centre) @ axes.T
-        distances = np.hypot(local[:, 0], local[:, 1])
-        residuals = np.concatenate([distances - radius, local[:, 2]])
-        square = float(residuals @ residuals)
-        if square >= best * (1 - 1e-15):
-            break
-        best, best_circle = square, (centre, axes, radius)
-        centre, axes, radius = _stepped(local, distances, residuals, best_circle)
-    centre, axes, radius = best_circle
-    local = (scaled - centre) @ axes.T
-    radial = np.hypot(local[:, 0], local[:, 1]) - radius
-    normal = unit(axes[2])
-    axial = ((scaled - centre) @ normal) * size
-    return CircleInSpace(
-        plane.point + centre * size, normal, radius * size, radial * size, axial, covered(local[:, :2])
-    )
-
-
-def _stepped(
-    local: Floats, distances: Floats, residuals: Floats, at: tuple[Floats, Floats, float]
-) -> tuple[Floats, Floats, float]:
-    """One step of Gauss and Newton in the circle's own frame: three shifts, two tilts, the radius."""
-    centre, axes, radius = at
-    x, y = local[:, 0] / distances, local[:, 1] / distances
-    none, one, z = np.zeros_like(x), np.ones_like(x), local[:, 2]
-    radial = np.column_stack([-x, -y, none, y * z, -x * z, -one])
-    axial = np.column_stack([none, none, -one, -local[:, 1], local[:, 0], none])
-    step = np.linalg.lstsq(np.vstack([radial, axial]), -residuals, rcond=1e-12)[0]
-    turned = axes[2] + step[4] * axes[0] - step[3] * axes[1]
-    turned /= np.linalg.norm(turned)
-    first = axes[0] - turned * (turned @ axes[0])
-    first /= np.linalg.norm(first)
-    return centre + step[:3] @ axes, np.array([first, np.cross(turned, first), turned]), radius + float(step[5])
 
 
 def _taubin(points: Floats) -> Floats:

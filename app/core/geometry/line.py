@@ -67,14 +67,3 @@ def line_through(point: Floats, direction: Floats, points: Floats) -> Line:
     else:
         residuals = np.linalg.norm(about - np.outer(along, direction), axis=1)
     return Line(point, direction, residuals, along)
-
-
-def distances(points: ArrayLike, point: ArrayLike, direction: ArrayLike) -> Floats:
-    """Distances of points from a line in space, mm. direction: of any length.
-
-    >>> distances([(3, 4, 9)], (0, 0, 0), (0, 0, 2)).tolist()
-    [5.0]
-    """
-    array = np.asarray(points, dtype=np.float64).reshape(-1, SPACE)
-    axis = np.asarray(direction, dtype=np.float64)
-    return line_through(np.asarray(point, dtype=np.float64), axis / np.linalg.norm(axis), array).residuals

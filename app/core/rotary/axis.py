@@ -31,7 +31,6 @@ Floats = NDArray[np.float64]
 Point = tuple[float, float, float]
 AxisName = Literal["A", "B", "C"]
 AXES: tuple[AxisName, ...] = ("A", "B", "C")
-LETTERS = "XYZ"
 ERRORS: dict[AxisName, tuple[str, str, str, str]] = {
     "A": ("EY0A", "EZ0A", "EB0A", "EC0A"),
     "B": ("EZ0B", "EX0B", "EC0B", "EA0B"),

@@ -176,35 +176,3 @@ def q_values(plan: MeasuringPlan) -> dict[str, QValue]:
         values["Q431"] = float(plan.preset)
     values["Q432"] = plan.backlash_angle
     return values
-
-
-def plan_of(cycle: Literal[451, 452], values: dict[str, QValue]) -> MeasuringPlan:
-    """The plan that a call says; what it does not say is 0 there. Words stand for themselves.
-
-    >>> plan = MeasuringPlan(452, 12.5, (AxisPlan("C", -90.0, 180.0, 0.0, 4),), feed="FMAX")
-    >>> plan_of(452, q_values(plan)).order == plan.order
-    True
-    """
-
-    def number(name: str) -> float:
-        value = values.get(name, 0.0)
-        return 0.0 if isinstance(value, str) else float(value)
-
-    axes = tuple(
-        AxisPlan(letter, number(start), number(end), number(incidence), int(number(points)))
-        for letter, (start, end, incidence, points) in OF_AXIS.items()
-    )
-    feed, clearance = values.get("Q253", 0.0), values.get("Q320", 0.0)
-    return MeasuringPlan(
-        cycle=cycle,
-        ball_radius=number("Q407"),
-        axes=axes,
-        clearance="PREDEF" if isinstance(clearance, str) else clearance,
-        retract_height=number("Q408"),
-        feed=feed,  # type: ignore[arg-type]
-        reference_angle=number("Q380"),
-        touches=int(number("Q423")),
-        backlash_angle=number("Q432"),
-        mode=int(number("Q406")),
-        preset=int(number("Q431")),
-    )

@@ -119,12 +119,3 @@ def counts_chart(
         sigma_z,
         provisional=len(x[used]) < FEWEST_SUBGROUPS,
     )
-
-
-def samples_for_a_lower_limit(rate: float) -> int:
-    """Parts that a sample of p takes, so that the lower limit is above 0: n > 9 (1 - p)/p (Montgomery, section 7.2.1).
-
-    >>> samples_for_a_lower_limit(0.02)
-    442
-    """
-    return int(9 * (1 - rate) / rate) + 1

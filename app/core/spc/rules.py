@@ -161,22 +161,6 @@ class Signals:
             painted(sides, rows)
         return sides
 
-    def flagged(self, name: RuleName) -> NDArray[np.bool_]:
-        """Mask of the points inside a run of this rule."""
-        edges = np.zeros(self.length + 1, np.int64)
-        rows = self.runs[name]
-        np.add.at(edges, rows[:, 1], 1)
-        np.add.at(edges, rows[:, 2] + 1, -1)
-        return np.cumsum(edges[:-1]) > 0
-
-
-def members(run: Run, rule: Rule, z: ArrayLike) -> NDArray[np.int64]:
-    """The points that make a signal: of a "k of n" those beyond the limit, else every point from start to end."""
-    at = np.arange(run.start, run.end + 1)
-    if rule.kind is not RuleKind.BEYOND:
-        return at
-    return at[run.side * np.asarray(z)[run.start : run.end + 1] > rule.limit]
-
 
 class Scan:
     """Rules that watch points as they come in, in pieces of any size; what was seen before is not forgotten.

@@ -2,7 +2,7 @@
 
 from typing import Annotated, Any, Literal
 
-from pydantic import Field, JsonValue, model_validator
+from pydantic import Field, model_validator
 from pydantic_core import PydanticCustomError
 
 from app.language.i18n import _
@@ -24,15 +24,6 @@ DIRECTIONS = {
     "+Z": [0.0, 0.0, 1.0],
     "-Z": [0.0, 0.0, -1.0],
 }
-
-SIX: list[JsonValue] = [
-    {"nominal": [10, 10, 0], "normal": "+Z", "deviation": 0.012},
-    {"nominal": [180, 15, 0], "normal": "+Z", "deviation": 0.046},
-    {"nominal": [90, 120, 0], "normal": "+Z", "deviation": 0.021},
-    {"nominal": [20, 0, -15], "normal": "-Y", "deviation": 0.104},
-    {"nominal": [170, 0, -15], "normal": "-Y", "deviation": -0.205},
-    {"nominal": [0, 60, -15], "normal": "-X", "deviation": 0.051},
-]
 
 
 class AlignmentPointIn(Body):

@@ -41,7 +41,7 @@ class AlarmKind:
     ``sentence``: the statement of what is wrong, worded from the values of the alarm. ``tone`` and ``icon``: as in
     `app.web.states`. ``actions``: the answers that make sense, the likeliest first; ``more_actions``: those that depend on
     the alarm. ``comments``: comments to choose from with one touch, by action, where they differ from the usual ones.
-    ``outcomes``: sentences of what followed, by code. ``holds_corrections``: a correction is held until it is answered.
+    ``outcomes``: sentences of what followed, by code.
     ``concerns_parts``: parts cut before may be bad. ``chart``: the address of the chart about it, of a characteristic's key and the alarm's values.
     """
 
@@ -55,7 +55,6 @@ class AlarmKind:
     more_actions: Callable[[Alarm], Sequence[Action]] = _nothing
     comments: Mapping[str, Texts] = field(default_factory=lambda: NONE)
     outcomes: Mapping[str, Callable[[Mapping[str, Any]], str]] = field(default_factory=lambda: NONE)
-    holds_corrections: bool = False
     concerns_parts: bool = False
     chart: Callable[[str, Mapping[str, Any]], str] | None = None
 

@@ -100,7 +100,6 @@ TOOL_WORN = register(
         tone="wear",
         icon="wear",
         actions=("tool_replaced", "keep_cutting", "sister_tool", "false_reading", "noted"),
-        holds_corrections=True,
     )
 )
 
@@ -206,7 +205,6 @@ IMPLAUSIBLE = register(
                 _("New material"),
             ],
         },
-        holds_corrections=True,
     )
 )
 HOLDING = (TOOL_WORN.name, IMPLAUSIBLE.name)  # a correction is held until they are answered

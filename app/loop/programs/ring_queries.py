@@ -1,6 +1,6 @@
 """The NC programs of the ring for a characteristic: settings from what a caller says, and the texts. Nothing is stored."""
 
-from typing import Literal, get_args
+from typing import Literal
 
 from app.core.parameters import MachineType
 from app.core.programs.lines import describing
@@ -12,7 +12,6 @@ from app.language.i18n import _
 from app.loop.characteristics.queries import CurrentCharacteristic
 
 RingPart = Literal["all", "definition", "setup", "reading", "correction", "tool", "call"]
-PARTS: tuple[str, ...] = get_args(RingPart)
 RING_CONTROLS = tuple(control.value for control in RingControl)
 MEASURED = {RingControl.SINUMERIK: "R43", RingControl.FANUC: "#510", RingControl.HAAS: "#188"}
 """The variable in which measuring cycles often leave the size: to be replaced by one's own."""

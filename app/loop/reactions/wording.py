@@ -22,11 +22,6 @@ def duration(seconds: float | None) -> str:
     return _("{n} d").format(n=f"{seconds / DAY:.1f}")
 
 
-def sort_word(sort: str) -> str:
-    """The name of a sort of the catalogue."""
-    return {"cause": _("Causes"), "action": _("Corrective actions")}.get(sort, sort)
-
-
 def scope_words(plan: ReactionPlan) -> str:
     """The alarms that a plan is for."""
     what = _("every alarm")

@@ -12,7 +12,6 @@ from sqlalchemy.orm import Mapped, mapped_column
 
 from app.db.base import Base
 
-MEMORIES = ("average", "tool")
 _MEMORY = "memory IN ('average', 'tool')"
 
 

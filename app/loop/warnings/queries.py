@@ -2,7 +2,6 @@
 
 from collections.abc import Iterable
 
-from sqlalchemy import select
 from sqlalchemy.orm import Session
 
 from app.core.geometry.plausible import Bounds
@@ -24,12 +23,3 @@ def acknowledgement(session: Session, machine_id: int, subject: str) -> WarningA
 def unacknowledged(session: Session, machine_id: int, subject: str, warnings: Iterable[CodedWarning]) -> list[str]:
     """The codes of the warnings that stop a program text; none once somebody has acknowledged them."""
     return [] if acknowledgement(session, machine_id, subject) else [warning.code for warning in warnings]
-
-
-def acknowledgements(session: Session, subjects: Iterable[str]) -> dict[str, WarningAcknowledgement]:
-    """The acknowledgements of these results by their names; numbers of results are unique beyond a machine."""
-    names = list(subjects)
-    if not names:
-        return {}
-    rows = session.scalars(select(WarningAcknowledgement).where(WarningAcknowledgement.subject.in_(names)))
-    return {row.subject: row for row in rows}

@@ -115,11 +115,6 @@ class AlarmLoad(NamedTuple):
         return self.period.end - self.period.start >= timedelta(days=DAYS)
 
     @property
-    def chattering(self) -> list[Loud]:
-        """Those of the noisiest that chatter."""
-        return [each for each in self.top if each.noise.chatters]
-
-    @property
     def share_of_top(self) -> float:
         """Share that the noisiest have of all alarms."""
         return sum(each.noise.share for each in self.top)

@@ -13,8 +13,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from app.core.geometry.circle import fit_circle, fit_circle_in_space
-from app.core.geometry.line import distances, fit_line
+from app.core.geometry.circle import fit_circle
+from app.core.geometry.line import fit_line, line_through
 from app.core.geometry.plane import fit_plane
 from app.core.geometry.points import Degenerate, Floats, Reason
 from tests.chance import examples
@@ -73,7 +73,7 @@ class TestReferencePairs:
         points = np.array([x, y, z]) + np.column_stack([off, along]) @ turn.T
         found = fit_line(points, 3)
         assert abs(found.direction @ turn[:, 2]) == pytest.approx(1, abs=1e-13)
-        assert distances([found.point], (x, y, z), turn[:, 2]) == pytest.approx(0, abs=1e-8)
+        assert line_through(np.array([x, y, z]), turn[:, 2], found.point[None]).residuals == pytest.approx(0, abs=1e-8)
         assert found.residuals == pytest.approx(np.hypot(*off.T), abs=1e-8)
 
     @given(seeds, places, places, places)
@@ -88,25 +88,6 @@ class TestReferencePairs:
         assert (found.point - np.array([x, y, z])) @ turn[:, 2] == pytest.approx(0, abs=1e-8)
         side = np.sign(found.normal @ turn[:, 2])
         assert found.residuals * side == pytest.approx(off, abs=1e-8)
-
-    @given(seeds, places, places, places)
-    def test_a_circle_in_space(self, seed: int, x: float, y: float, z: float) -> None:
-        random = np.random.default_rng(seed)
-        turn, radius = rotation(random), 35.0
-        angles = np.linspace(0, 2 * np.pi, 16, endpoint=False)
-        c, s = np.cos(angles), np.sin(angles)
-        none = np.zeros(16)
-        # What radial and axial distances change by: three shifts, two tilts, the radius.
-        radial = np.column_stack([c, s, none, none, none, np.ones(16)])
-        axial = np.column_stack([none, none, np.ones(16), radius * s, radius * c, none])
-        off = orthogonal_to(np.vstack([radial, axial]), random, 0.01)
-        reach = radius + off[:16]
-        points = np.array([x, y, z]) + np.column_stack([reach * c, reach * s, off[16:]]) @ turn.T
-        found = fit_circle_in_space(points)
-        # Second order in the residuals: a touch out of the plane is turned about a longer lever.
-        assert found.centre == pytest.approx([x, y, z], abs=1e-5)
-        assert found.radius == pytest.approx(radius, abs=1e-5)
-        assert abs(found.normal @ turn[:, 2]) == pytest.approx(1, abs=1e-9)
 
 
 class TestInvariance:

@@ -1,6 +1,6 @@
 """Calls of the kinematics cycles: read as the control writes them, written, read again, and mutilated."""
 
-from typing import Any
+from typing import Any, Literal
 
 import pytest
 from hypothesis import given
@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from app.core.programs import heidenhain
 from app.core.programs.lines import LineVerdict, Note, Program, ProgramError, ProgramKind
 from app.core.rotary.axis import AXES
-from app.core.rotary.measuring_plan import AxisPlan, MeasuringPlan, faults, plan_of, positions, warnings
+from app.core.rotary.measuring_plan import OF_AXIS, AxisPlan, MeasuringPlan, QValue, faults, positions, warnings
 from tests.chance import examples
 
 CALL = """0 BEGIN PGM HEAD MM
@@ -50,6 +50,33 @@ def codes(text: str, line: int) -> list[str]:
 def only(text: str) -> Program:
     (program,) = heidenhain.read(text).programs
     return program
+
+
+def plan_of(cycle: Literal[451, 452], values: dict[str, QValue]) -> MeasuringPlan:
+    """The plan that a call says; what it does not say is 0 there. Words stand for themselves."""
+
+    def number(name: str) -> float:
+        value = values.get(name, 0.0)
+        return 0.0 if isinstance(value, str) else float(value)
+
+    axes = tuple(
+        AxisPlan(letter, number(start), number(end), number(incidence), int(number(points)))
+        for letter, (start, end, incidence, points) in OF_AXIS.items()
+    )
+    feed, clearance = values.get("Q253", 0.0), values.get("Q320", 0.0)
+    return MeasuringPlan(
+        cycle=cycle,
+        ball_radius=number("Q407"),
+        axes=axes,
+        clearance="PREDEF" if isinstance(clearance, str) else clearance,
+        retract_height=number("Q408"),
+        feed=feed,  # type: ignore[arg-type]
+        reference_angle=number("Q380"),
+        touches=int(number("Q423")),
+        backlash_angle=number("Q432"),
+        mode=int(number("Q406")),
+        preset=int(number("Q431")),
+    )
 
 
 def test_the_calls_are_read_with_their_q_parameters() -> None:

@@ -24,7 +24,6 @@ from app.core.spc.rules import (
     RuleKind,
     RuleName,
     Scan,
-    members,
     signals,
     signals_of_cusum,
 )
@@ -74,9 +73,13 @@ def expected(rule: Rule, z: list[float]) -> set[tuple[int, int]]:
 @given(z=POINTS)
 @examples(150)
 def test_the_points_of_all_signals_are_those_of_the_definition(rule: Rule, z: list[float]) -> None:
-    found = [(run, members(run, rule, z)) for run in signals(z, [rule])]
-    assert {(run.side, int(i)) for run, points in found for i in points} == expected(rule, z)
-    for run, points in found:
+    found = list(signals(z, [rule]))
+    members = [
+        [i for i in range(run.start, run.end + 1) if rule.kind is not RuleKind.BEYOND or run.side * z[i] > rule.limit]
+        for run in found
+    ]
+    assert {(run.side, i) for run, points in zip(found, members, strict=True) for i in points} == expected(rule, z)
+    for run, points in zip(found, members, strict=True):
         assert (run.start, run.end, run.points) == (points[0], points[-1], len(points))
 
 
@@ -168,12 +171,6 @@ def test_the_signals_of_a_cusum_are_its_points_beyond_the_limit(z: list[float]) 
     for side, sums in ((1, chart.above), (-1, chart.below)):
         flagged = {i for run in found if run.side == side for i in range(run.start, run.end + 1)}
         assert flagged == set(np.flatnonzero(sums > chart.limit).tolist())
-
-
-def test_what_is_flagged_lies_in_the_runs() -> None:
-    found = signals([0.0, 3.5, 0.0, 0.0, -4.0, -4.0])
-    assert found.count(RuleName.NELSON_1) == 2
-    assert found.flagged(RuleName.NELSON_1).tolist() == [False, True, False, False, True, True]
 
 
 def test_ranges_and_averages_know_no_rule_but_their_limits() -> None:

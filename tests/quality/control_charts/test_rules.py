@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from app.core.spc.points import ChartSettings, Piece
-from app.core.spc.rules import RULES, RuleName, members, signals
+from app.core.spc.rules import RULES, RuleKind, RuleName, signals
 from app.core.spc.shewhart import Chart
 from app.core.spc.watch import Watch
 from app.quality.control_charts.monitoring import Place, Setting, read_rules, stored_rules
@@ -155,8 +155,10 @@ class TestPictures:
     @pytest.mark.parametrize("name", RuleName)
     def test_a_picture_shows_exactly_what_its_rule_finds(self, name: RuleName) -> None:
         z, hits = PATTERNS[name]
-        (run,) = signals(z, [RULES[name]])
-        assert members(run, RULES[name], z).tolist() == list(hits)
+        (run,) = signals(z, [rule := RULES[name]])
+        inside = range(run.start, run.end + 1)
+        members = [at for at in inside if rule.kind is not RuleKind.BEYOND or run.side * z[at] > rule.limit]
+        assert members == list(hits)
         drawn = picture(name, Chart.INDIVIDUALS)
         assert len(drawn.hits) == len(list(hits))
         assert len(drawn.points) + len(drawn.hits) == len(z)

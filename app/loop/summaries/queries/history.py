@@ -25,7 +25,6 @@ BLOCK = 8_192  # readings in one string
 MOST_AT_ONCE = 10_000_000  # readings: 80 MB a column
 MOST_KEPT = 2_000_000  # for a session that asks for them again
 
-Floats = NDArray[np.float64]
 Whole = NDArray[np.int64]
 
 # What can be had: how it is sent, how NumPy reads it. A missing float is NaN, a missing whole number or moment -1.
