@@ -116,11 +116,16 @@ def read_um(deviation_mm: float | None, half_mm: float | None) -> str:
     >>> read_um(-0.406575, 0.3), read_um(0.0061, 0.008), read_um(0.0004, 0.3), read_um(0.0061, None)
     ('−407\xa0µm', '+6.1\xa0µm', '+0.4\xa0µm', '+6.1\xa0µm')
     """
+    return NOTHING if deviation_mm is None else f"{read_in_um(deviation_mm, half_mm)}{NO_BREAK_SPACE}µm"
+
+
+def read_in_um(deviation_mm: float | None, half_mm: float | None) -> str:
+    """The same without its unit."""
     if deviation_mm is None or half_mm is None:
-        return um(deviation_mm)
+        return in_um(deviation_mm)
     decimals = deserved(half_mm, deviation_mm)
     reads_as_zero = round(deviation_mm * 1000, decimals) == 0 < abs(deviation_mm)
-    return um(deviation_mm, max(decimals, 1) if reads_as_zero else decimals)
+    return in_um(deviation_mm, max(decimals, 1) if reads_as_zero else decimals)
 
 
 def in_um(deviation_mm: float | None, decimals: int = 1) -> str:

@@ -78,6 +78,7 @@ def environment() -> Environment:
         labelled=cards.labelled,
         um=numbers.um,
         read_um=numbers.read_um,
+        read_in_um=numbers.read_in_um,
         um_limit=numbers.um_limit,
         tolerance=lambda of: numbers.tolerance_um(of.half, of.natural_limit),
         mm=numbers.mm,

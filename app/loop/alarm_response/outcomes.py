@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from typing import Any
 
 from app.language.i18n import _, ngettext
-from app.language.numbers import mm, um
+from app.language.numbers import mm, read_um
 from app.loop.alarms.kinds import kinds
 
 MOST_NUMBERS = 5  # in one sentence
@@ -17,13 +17,13 @@ def numbers(values: Sequence[int]) -> str:
     return f"{', '.join(map(str, values[: MOST_NUMBERS - 1]))} … {values[-1]}"
 
 
-def outcomes(outcome: Sequence[dict[str, Any]] | None) -> list[dict[str, Any]]:
-    """The consequences, each with its sentence."""
+def outcomes(outcome: Sequence[dict[str, Any]] | None, half: float | None = None) -> list[dict[str, Any]]:
+    """The consequences, each with its sentence. half: as of `deserved`, mm."""
     if outcome is None:
         return []
     if not outcome:
         return [{"code": "nothing_else", "text": _("Nothing else was changed.")}]
-    return [{**item, "text": _followed(item)} for item in outcome]
+    return [{**item, "text": _followed(item, half)} for item in outcome]
 
 
 def found_by_hand(measured: float | None, good: bool | None) -> str:
@@ -32,11 +32,11 @@ def found_by_hand(measured: float | None, good: bool | None) -> str:
     return ", ".join([*([mm(measured)] if measured is not None else []), *verdict])
 
 
-def _followed(item: dict[str, Any]) -> str:
+def _followed(item: dict[str, Any], half: float | None) -> str:
     values = {
         **item,
         "offset": mm(item.get("offset")),
-        "amount": um(item.get("amount")),
+        "amount": read_um(item.get("amount"), half),
         "numbers": numbers(item.get("numbers", ())),
         "sequences": numbers(item.get("sequences", ())),
         "locations": numbers(item.get("locations", ())),

@@ -4,7 +4,7 @@ import logging
 from collections.abc import Sequence
 
 from app.language.i18n import _, ngettext
-from app.language.numbers import um
+from app.language.numbers import read_um
 from app.language.times import in_sentence
 from app.loop.alarm_response.queries import AlarmRow
 from app.loop.alarms.kinds import kind_named
@@ -89,7 +89,7 @@ def consequences(row: AlarmRow, action: str) -> list[str]:
             if held is not None:
                 sentences.append(
                     _("Correction {number} of {amount} is released: the machine applies it to tool {tool}.").format(
-                        number=held.number, amount=um(held.amount), tool=held.tool_memory
+                        number=held.number, amount=read_um(held.amount, alarm.data.get("limit")), tool=held.tool_memory
                     )
                 )
                 sentences.append(

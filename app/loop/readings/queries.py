@@ -347,8 +347,11 @@ def latest(
 
 def reasons(
     session: Session, machine_id: int, asked: Iterable[tuple[int, int, float]]
-) -> dict[tuple[int, int], dict[str, Any]]:
-    """Return the reasons of corrections: those of the readings (characteristic id, sequence, amount in mm) behind them."""
+) -> dict[tuple[int, int], tuple[dict[str, Any], float]]:
+    """Return the reasons of corrections: those of the readings (characteristic id, sequence, amount in mm) behind them.
+
+    Beside each the half tolerance by which it was judged, mm.
+    """
     amounts = {(characteristic_id, sequence): amount for characteristic_id, sequence, amount in asked}
     rows = session.execute(
         select(*COLUMNS).where(
@@ -360,7 +363,7 @@ def reasons(
         at = (record.characteristic_id, record.sequence)
         parameters = characteristics.parameters_of(session, machine_id, at[0], record.parameters_version)
         said = reason(record, parameters, amounts[at])
-        reasons_by_key[at] = said | {"as_read": as_read(record, parameters, amounts[at])}
+        reasons_by_key[at] = said | {"as_read": as_read(record, parameters, amounts[at])}, parameters.half
     return reasons_by_key
 
 

@@ -53,7 +53,8 @@ class CorrectionRow(NamedTuple):
     """A correction with what people and machines want to know beside it.
 
     expected: the offset that the control holds once the pending ones up to this one and this one are applied; None when
-    it will not be applied any more, or has been. reason: code and sentence of the reading that asked for it.
+    it will not be applied any more, or has been. reason: code and sentence of the reading that asked for it. half: of the
+    tolerance that it was judged by, mm.
     """
 
     correction: Correction
@@ -61,6 +62,7 @@ class CorrectionRow(NamedTuple):
     characteristic: str
     expected: float | None
     reason: dict[str, Any] | None
+    half: float | None
 
 
 def tool(session: Session, machine: Machine, number: int) -> Tool:
@@ -266,7 +268,7 @@ def rows_of(session: Session, machine: Machine, corrections: Sequence[Correction
             machine.key,
             names[c.characteristic_id],
             expected.get(c.number),
-            why.get((c.characteristic_id, c.sequence)),
+            *why.get((c.characteristic_id, c.sequence), (None, None)),
         )
         for c in corrections
     ]

@@ -9,7 +9,7 @@ from sqlalchemy.orm import Session
 from app.access.callers import Caller
 from app.core.plausibility import empirical_value_warnings, offset_warnings
 from app.language.i18n import _, ngettext
-from app.language.numbers import mm, typed_length, um
+from app.language.numbers import mm, read_um, typed_length, um
 from app.loop.characteristics.correction_queries import open_corrections
 from app.loop.tables.machines import Machine
 from app.loop.tools import actions, applying, queries, sister_actions, wording
@@ -51,7 +51,7 @@ class OfCorrection(OfMachine):
         row = self.row
         return {
             "number": self.number,
-            "amount": um(row.correction.amount),
+            "amount": read_um(row.correction.amount, row.half),
             "tool": row.correction.tool_memory,
             "after": "–" if row.expected is None else mm(row.expected),
         }

@@ -48,6 +48,11 @@ class Group(NamedTuple):
     total: float
     after: float
 
+    @property
+    def half(self) -> float:
+        """Half of the finest of their tolerances, mm: it says the decimals of the sum."""
+        return min(each.parameters.half for each in self.waiting)
+
 
 def count_by_machine(session: Session) -> dict[int, int]:
     """Number of waiting corrections by the machine's id."""

@@ -6,7 +6,7 @@ from typing import Any
 
 from app.errors import NotFound
 from app.language.i18n import _, ngettext
-from app.language.numbers import mm, um
+from app.language.numbers import mm, read_um
 from app.loop.tables.tools import Correction
 from app.loop.tools import actions, queries
 from app.loop.tools.schemas import DecisionsIn
@@ -41,7 +41,7 @@ class OfTool(OfMachine):
             "tool": self.number,
             "n": len(group.approvable),
             "numbers": ", ".join(map(str, group.approvable)),
-            "total": um(group.total),
+            "total": read_um(group.total, group.half),
             "offset": mm(group.tool.offset),
             "after": mm(group.after),
         }

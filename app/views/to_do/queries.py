@@ -9,16 +9,17 @@ from datetime import datetime
 from typing import Literal, NamedTuple
 
 from sqlalchemy import ColumnElement, Select, any_, func, select, union_all
-from sqlalchemy.orm import Session
+from sqlalchemy.orm import Session, aliased
 
 from app.access.callers import Caller, Role
 from app.jobs.tables import JobFailure
 from app.jobs.wording import job_word
 from app.language.i18n import _, ngettext
-from app.language.numbers import um
+from app.language.numbers import read_um
 from app.loop.alarm_response import queries as alarms
 from app.loop.alarm_response import wording
 from app.loop.alarms.reading_kinds import HOLDING
+from app.loop.characteristics.queries import parameters_of
 from app.loop.quarantine import queries as quarantine
 from app.loop.quarantine.tables import Quarantine
 from app.loop.tables.alarms import Alarm
@@ -126,12 +127,19 @@ def _alarms(session: Session, machine: Machine | None) -> Iterator[Task]:
 
 
 def _corrections(session: Session, machine: Machine | None) -> Iterator[Task]:
+    asking = aliased(Reading)  # a held one looks for readings of its own
     query = (
-        select(Correction, Machine, Characteristic.name)
+        select(Correction, Machine, Characteristic.name, asking.parameters_version)
         .join(Machine, Machine.id == Correction.machine_id)
         .join(
             Characteristic,
             (Characteristic.machine_id == Correction.machine_id) & (Characteristic.id == Correction.characteristic_id),
+        )
+        .join(
+            asking,
+            (asking.machine_id == Correction.machine_id)
+            & (asking.characteristic_id == Correction.characteristic_id)
+            & (asking.sequence == Correction.sequence),
         )
         .where(_TO_DECIDE)
         .order_by(Correction.created_at)
@@ -139,7 +147,8 @@ def _corrections(session: Session, machine: Machine | None) -> Iterator[Task]:
     )
     if machine is not None:
         query = query.where(Correction.machine_id == machine.id)
-    for correction, at, name in session.execute(query):
+    for correction, at, name, version in session.execute(query):
+        half = parameters_of(session, at.id, correction.characteristic_id, version).half
         yield Task(
             kind="correction",
             state=correction.status,
@@ -147,7 +156,7 @@ def _corrections(session: Session, machine: Machine | None) -> Iterator[Task]:
             machine=at,
             about=name,
             sentence=_("Tool {number}: correction of {amount}").format(
-                number=correction.tool_memory, amount=um(correction.amount)
+                number=correction.tool_memory, amount=read_um(correction.amount, half)
             ),
             since=correction.created_at,
             action=_("Decide"),

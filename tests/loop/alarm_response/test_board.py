@@ -22,18 +22,18 @@ class TestWithoutScripts:
         assert kinds(text) == ["Tool worn", "Oversize"]
         assert "deviation +20.0" in text
         assert "tool 3 is worn" in text
-        assert '−330.0<span class="unit">µm' in text  # the held correction: 20 µm are on their way already
+        assert '−330<span class="unit">µm' in text  # the held correction: 20 µm are on their way already
 
     def test_two_steps_from_alarm_to_what_followed(self, shop: Shop, operator: Person) -> None:
         number = shop.read(350.0)["correction"]["number"]
         (alarm,) = shop.alarms()
         question = operator.open(f"/alarms/{alarm['id']}?action=keep_cutting")
-        assert f"Correction {number} of −350.0" in question
+        assert f"Correction {number} of −350\N{NO-BREAK SPACE}µm" in question
         assert "is released" in question
         done = operator.send(
             f"/alarms/{alarm['id']}/acknowledge", action="keep_cutting", comment="Edge looked at", more="by Ana"
         )
-        assert f"Correction {number} of −350.0" in done
+        assert f"Correction {number} of −350\N{NO-BREAK SPACE}µm" in done
         assert operator.name in done
         after = shop.call("GET", f"/alarms/{alarm['id']}")
         assert (after["comment"], after["acknowledged_by"]) == ("Edge looked at: by Ana", operator.name)
@@ -140,7 +140,7 @@ class TestTwoTouches:
         dialog = page.get_by_role("dialog")
         expect(dialog).to_contain_text("is released")
         dialog.get_by_role("button", name="Keep cutting").click()  # the second
-        expect(page.locator("main")).to_contain_text(f"Correction {number} of −350.0")
+        expect(page.locator("main")).to_contain_text(f"Correction {number} of −350\N{NO-BREAK SPACE}µm")
         expect(card).to_have_count(0)
         expect(page.locator(".acknowledged")).to_contain_text(operator.name)
         assert "done" not in page.url

@@ -45,3 +45,24 @@ def test_pages_show_it_and_answers_stay_exact(shop: Shop, viewer: Person) -> Non
     page = viewer.open(f"/characteristics/{shop.characteristic}/readings/1")
     assert "Deviation 6.1 µm" in page
     assert "6.128 µm" not in page
+
+
+def test_amounts_have_the_same_decimals_as_the_sentences(shop: Shop, operator: Person) -> None:
+    coarse = shop.another("flange", tolerance_width=0.4, averaging_limit=0.06, tool_memory=4, mode="approval")
+    for deviation in (81.32, 160.5):  # the second counts as 79.18 after the first
+        shop.read(deviation, coarse)
+    amounts = [c["amount"] for c in shop.call("GET", f"/machines/{shop.machine}/corrections?tool_memory=4")["items"]]
+    rounded = [f"−{-amount * 1000:.0f}\N{NO-BREAK SPACE}µm" for amount in (*amounts, sum(amounts))]
+    assert amounts[0] == -0.08132
+    asked = {
+        f"/todo?machine={shop.machine}": rounded[:2],
+        f"/station/{shop.machine}": rounded,
+        f"/corrections?machine={shop.machine}": rounded[-1:],
+        f"/plant/{shop.machine}": rounded[1:2],
+        f"/characteristics/{coarse}": rounded[:2],
+    }
+    pages = {address: operator.open(address) for address in asked}
+    assert {address: [each for each in words if each not in pages[address]] for address, words in asked.items()} == {
+        address: [] for address in asked
+    }
+    assert [address for address, text in pages.items() if "−81.3" in text or '+79.2<span class="unit">' in text] == []

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 from app.charts import Dots, Note, Pen, Role, Series, Share, bold
 from app.language.i18n import _
-from app.language.numbers import um
+from app.language.numbers import read_um
 from app.loop.timeline.figures import TOOL_CHANGE, Event
 from app.loop.tools.wording import status_word
 
@@ -44,11 +44,12 @@ def offset_lane(
     span: tuple[float, float],
     total_before: float,
     *,
+    half: float,
     brief: bool = False,
 ) -> list[Series | Note]:
     """The sum of the corrections since the tool was changed as steps; each correction a mark by its status.
 
-    brief: beside it the sum alone, without the newest correction.
+    half: of the tolerance, mm. brief: beside it the sum alone, without the newest correction.
     """
     course: list[tuple[float, int, Step | None]] = [(step.sequence, 1, step) for step in steps]
     course += [(event.at, 0, None) for event in events if event.kind == TOOL_CHANGE and isinstance(event.at, int)]
@@ -87,7 +88,7 @@ def offset_lane(
             meta="corrections",
             hover=[
                 bold(_("Correction {n}").format(n=step.number))
-                + f"<br>{um(step.amount)} · {status_word(step.status)}<br>"
+                + f"<br>{read_um(step.amount, half)} · {status_word(step.status)}<br>"
                 + _("Reading {n}").format(n=step.sequence)
                 for step, _total in at
             ],
@@ -96,7 +97,7 @@ def offset_lane(
     )
     newest, value = at[-1]
     words = _("correction {n}: {amount}, {status}").format(
-        n=newest.number, amount=um(newest.amount), status=status_word(newest.status)
+        n=newest.number, amount=read_um(newest.amount, half), status=status_word(newest.status)
     )
-    text = f"<b>Σ {um(value / 1000)}</b>" + ("" if brief else f"<br>{words}")
+    text = f"<b>Σ {read_um(value / 1000, half)}</b>" + ("" if brief else f"<br>{words}")
     return [*marked, Note(text, Share(1), Share(0.5, inside=True), "left", shift=(8, 0), colour="correction")]

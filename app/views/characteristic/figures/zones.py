@@ -111,7 +111,7 @@ def zone_chart(
         *_beyond(points, ruler, span, pixels),
         *([] if points or blocks else [empty(_("No readings yet"))]),
     ]
-    offsets = offset_lane(steps, events, span, total_before, brief=brief)
+    offsets = offset_lane(steps, events, span, total_before, half=half_of(limits), brief=brief)
     total = Axis(
         "" if brief else _("Σ correction, µm"),
         ticks=3,
