@@ -48,7 +48,8 @@ def readings(chance: random.Random, count: int, numbers: int) -> list[tuple[int,
         clock += timedelta(seconds=chance.choice([20, 20, 20, -45]))
         size = chance.gauss(0, 1.5) + (chance.random() < 0.01) * chance.choice([7, 12, 400, 1500, -9])
         reading: dict[str, Any] = {"measured": round(40 + size / 1000, chance.choice([4, 6, 9]))}
-        reading["measured_at"] = clock.isoformat()
+        ahead = timedelta(hours=chance.choice([0] * 40 + [8, 20]))
+        reading["measured_at"] = (clock + ahead).isoformat()
         if chance.random() < 0.7:
             reading["part"] = f"SN-Š{at}"
         if chance.random() < 0.7:
