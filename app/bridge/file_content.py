@@ -220,12 +220,7 @@ class _Reader:
                 continue
             fields = {name: cell_of(row, column) for name, column in columns.items() if has(row, column)}
             if label := next(filter(is_summary, labels_of(fields, row)), None):
-                self._fault(
-                    line,
-                    "",
-                    "holds limits or statistics, no part: let the program write readings alone.",
-                    str(label)[:40],
-                )
+                self._statistics(line, str(label)[:40])
                 continue
             for name in fields.keys() & set(TEMPERATURES):
                 if not in_celsius(columns[name]):
@@ -243,7 +238,7 @@ class _Reader:
                 else [name for name in self.machine.characteristics if name in row]
             )
             try:
-                units |= {column: unit(column) for column in sizes if column not in units}
+                units |= {column: self.settings.unit or unit(column) for column in sizes if column not in units}
             except UnknownUnit as error:
                 self._fault(line, error.word, unit_in_doubt(error.word))
                 return
@@ -261,6 +256,16 @@ class _Reader:
             for name in sizes:
                 if row[name] not in {None, ""} and str(row[name]).strip():
                     self._take(line, name, fields | {"measured": row[name]}, row, units[name])
+
+    def _statistics(self, line: int, label: str) -> None:
+        """A row of limits or statistics, which is no part."""
+        if self.settings.statistics == "skip":
+            self._remark(aqdef.Remark(line, "", label, "holds limits or statistics; passed over"))
+            return
+        reason = (
+            'holds limits or statistics, no part: let the program write readings alone, or set statistics = "skip".'
+        )
+        self._fault(line, "", reason, label)
 
     def _other_nominal(self, line: int, name: str, nominal: str) -> str:
         """The reason against a row with another nominal size than the first of its name has: it is another characteristic."""
@@ -282,7 +287,7 @@ class _Reader:
                 continue
             try:
                 for fields in patterns.find(text.rstrip("\n")):
-                    self._take(line, fields.get("characteristic", EVERY).strip(), fields, fields)
+                    self._take(line, fields.get("characteristic", EVERY).strip(), fields, fields, self.settings.unit)
             except TooSlow as error:
                 self._fault(line, "", str(error))
                 return  # the next line would take as long

@@ -107,7 +107,7 @@ def unit_in_doubt(word: str) -> str:
     """The reason against sizes whose header, or a line above it, names a unit that cannot be taken."""
     return (
         f"the header, or a line above it, names the unit {word}: nobody can tell of which sizes, or it is no length that is known "
-        f"({', '.join(LENGTHS)}). Name the unit in the header of the column, or none where the sizes are in the machine's."
+        f"({', '.join(LENGTHS)}). Name the unit in the header of the column, or set unit under the machine's folder."
     )
 
 

@@ -8,6 +8,7 @@ from msgspec import Struct
 from app.bridge.configuration import Positive
 from app.bridge.fields import FIELDS, refuse_unknown
 from app.bridge.patterns import check_expressions
+from app.files.formats.units import Unit
 
 
 class Settings(Struct, forbid_unknown_fields=True, frozen=True):
@@ -23,7 +24,8 @@ class Settings(Struct, forbid_unknown_fields=True, frozen=True):
     ``measured`` holds for the lines below. decimal, delimiter, encoding: of the text; the last two are found out if they are
     left out. sheet: of a workbook; the first with cells if it is left out. times: the form of times, as strptime has it. zone: of times without an offset. day_first: in dates
     with strokes, AQDEF only. missing: marks in place of a size that was not measured. others: readings of a characteristic that has no name in ``characteristics`` make the file fail,
-    or are passed over. decisions: an absolute path, of a file that says `stop` or `hold`; anyone who acts on it removes it.
+    or are passed over. statistics: rows of limits or statistics do the same. unit: of sizes whose row and cell name none, whatever
+    names of columns and lines above them say. decisions: an absolute path, of a file that says `stop` or `hold`; anyone who acts on it removes it.
     """
 
     path: str
@@ -46,6 +48,8 @@ class Settings(Struct, forbid_unknown_fields=True, frozen=True):
     day_first: bool | None = None
     missing: tuple[str, ...] = ()
     others: Literal["fail", "skip"] = "fail"
+    statistics: Literal["fail", "skip"] = "fail"
+    unit: Unit | None = None
     decisions: str | None = None
 
     def __post_init__(self) -> None:

@@ -21,6 +21,10 @@ SUMMARIES = frozenset({
     "stdev", "std dev", "std deviation", "sigma", "s", "sd", "standard deviation", "standardabweichung",
     "standardna devijacija", "standardni odklon", "cp", "cpk", "pp", "ppk", "cm", "cmk", "count", "anzahl", "n", "sum",
     "summe", "total", "gesamt", "suma", "vsota", "итого", "сумма", "ukupno", "skupaj",
+    "stddev", "std abw", "stdabw", "standardabw", "standard dev", "st dev", "streuung", "varianz", "variance", "mittelw", "mw", "durchschnitt",
+    "mean value", "average value", "max value", "min value", "maximum value", "minimum value", "maxwert", "minwert", "kleinstwert",
+    "grosstwert", "grosster wert", "kleinster wert", "toleranzmitte", "x quer", "6s", "6σ", "σ", "otg", "utg", "moyenne", "ecart type", "etendue",
+    "cote nominale", "media", "dev std", "promedio", "prosecna vrednost", "broj merenja", "total parts",
 })  # fmt: skip
 """First cells of rows that hold limits or statistics, and no part. Folded."""
 

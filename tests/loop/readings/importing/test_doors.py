@@ -154,6 +154,16 @@ TABLES = {
     "heading again": Case(
         "Time;D40\n18.11.2025 06:05;40,001\nTime;D40\n18.11.2025 06:06;40,002\n", morning(40.001, 40.002)
     ),
+    "footer that is left out": Case(
+        THREE + "\nMean;40,002\nStdDev;0,001\nDurchschnitt;40,002\n",
+        morning(40.001, 40.002, 40.003),
+        cli={"last_line": 4},
+        page={"last_line": "4"},
+        bridge={"statistics": "skip"},
+    ),
+    "footer without times": Case(
+        "Part;D40\nP1;40,001\nP2;40,002\nDurchschnitt;40,0015\nMax value;40,002\n", bad=(4, 5)
+    ),
     "footer": Case(THREE + "\nMean;40,002\nCpk;1,45\n", bad=(6, 7)),
     "blanks": Case(
         PRINTED,
@@ -197,6 +207,14 @@ TABLES = {
     ),
     "in that may be inches": Case(THREE.replace("D40", "Bore in"), words="in", whole=True, column="Bore in"),
     "braces": Case("Time,Size {in}\n2025-11-18 06:05,1.57480\n", morning(39.99992), column="Size {in}"),
+    "a unit that is in doubt and named": Case(
+        "Time,Bore in\n2025-11-18 06:05,1.57480\n",
+        morning(39.99992),
+        column="Bore in",
+        cli={"unit": data.Unit.INCH},
+        page={"unit": "inch"},
+        bridge={"unit": "inch"},
+    ),
     "in within a word": Case(THREE.replace("D40", "BoreIn"), words="In", whole=True, column="BoreIn"),
     "mu": Case(THREE.replace("D40", "D40 mu"), words="mu", whole=True, column="D40 mu"),
     "an area": Case(THREE.replace("D40", "D40 [mm²]"), words="mm²", whole=True, column="D40 [mm²]"),
@@ -289,6 +307,14 @@ BOOKS = {
             [DAY, time(6, 7), 1.57488, '"'],
         ],
         good=morning(40.001, 40.002, 40.001952),
+    ),
+    "workbook with a footer": Case(
+        cells=[["Time", "D40"], [DAY.replace(hour=6, minute=5), 40.001], [], ["Mittelwert", 40.001]],
+        good=morning(40.001),
+        cli={"last_line": 2},
+        page={"last_line": "2"},
+        bridge={"statistics": "skip"},
+        formats={"B2": '0.00"mm"', "B4": '0.00"mm"'},
     ),
     "workbook with a formula": Case(
         cells=[["Time", "D40"], [DAY, 40.001], [DAY, "=A1"], [DAY, "#N/A"]], bad=(3, 4), words="formula"
