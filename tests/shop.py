@@ -136,6 +136,7 @@ class Person:
         self.name = unique(role)
         server.person(self.name, role, PASSWORD)
         self.browser: httpx.Client = server.client()
+        self._session, self._csrf = "", ""
         answer = self.browser.post("/sign-in", data={"name": self.name, "password": PASSWORD})
         assert answer.status_code == 303, answer.text
         self.browser.follow_redirects = True
@@ -159,11 +160,14 @@ class Person:
         return answer
 
     def csrf(self) -> str:
-        """The token of this session, which each change carries."""
-        text = self.open("/account")  # a page that is as short on a crowded server
-        found = re.search(r'<meta name="csrf" content="([^"]+)"', text)
-        assert found is not None
-        return found[1]
+        """The token of this session, which each change carries. Read from a page once: it is good as long as the session is."""
+        session = str(self.browser.cookies)
+        if session != self._session:
+            text = self.open("/account")  # a page that is as short on a crowded server
+            found = re.search(r'<meta name="csrf" content="([^"]+)"', text)
+            assert found is not None
+            self._session, self._csrf = str(self.browser.cookies), found[1]
+        return self._csrf
 
     def sign_in(self, page: Page) -> None:
         """The same person in a real browser, which takes over the session; tests/access/test_sign_in.py types the password."""
