@@ -44,9 +44,9 @@ def test_one_characteristic_that_fails_is_shown_and_silences_no_other(shop: Shop
     for line in (bad, good):
         line.push([0.0, 50.0])
     good.look()
-    assert good.told() == [("individuals", "nelson_1", 62, 62)]
+    assert good.runs() == [("individuals", "nelson_1", 62, 62)]
     assert len(good.alarms()) == 1
-    assert bad.told() == []
+    assert bad.runs() == []
 
     client = shop.server.client()
     assert 'inband_failing_jobs{job="run_rules"} 1.0' in client.get("/metrics").text
@@ -70,7 +70,7 @@ def test_one_characteristic_that_fails_is_shown_and_silences_no_other(shop: Shop
     with shop.server.database.begin() as session:
         session.execute(text("UPDATE watching SET memory = '{}', looked = 0, baseline_version = 0"))
     retried(shop)
-    assert bad.told() == [("individuals", "nelson_1", 62, 62)]
+    assert bad.runs() == [("individuals", "nelson_1", 62, 62)]
     assert 'inband_failing_jobs{job="run_rules"} 0.0' in client.get("/metrics").text
     assert bad.key not in shop.admin.get("/setup/jobs").text
 

@@ -172,7 +172,7 @@ def roundness(feature: ProbedFeature) -> Form:
         suspects += suspect.suspects
         tested = tested and suspect.tested
         details.append(
-            _circle_told(circle, section) | {"ring": ring} | {value.method.value: value.value for value in values}
+            _circle_details(circle, section) | {"ring": ring} | {value.method.value: value.value for value in values}
         )
     methods = [
         method for method in Method if all(any(v.method is method for v in values) for values in values_of_sections)
@@ -262,7 +262,7 @@ def axis_straightness(feature: ProbedFeature) -> Form:
     if len(sections) < 3:
         raise Degenerate(Reason.TOO_FEW, have=len(sections), needed=3)
     centres = centres_of(sections)
-    details = sections_told(sections)
+    details = section_details(sections)
     printed: tuple[Value, ...] = ()
     with suppress(Degenerate):  # where all centres have one X the printed method has no line
         printed = (Value(Method.PRINTED, printed_straightness([tuple(point.at) for point in centres])),)
@@ -289,7 +289,7 @@ def axis_straightness(feature: ProbedFeature) -> Form:
     )
     for point, off in zip(details, away.tolist(), strict=True):
         point["off"] = off
-    return Form(values, in_bore(sections), details={"sections": details, "axis": axis_told(axis)})
+    return Form(values, in_bore(sections), details={"sections": details, "axis": axis_details(axis)})
 
 
 def _cylinder_cofactor(points: Floats, cofactors: Floats, zone: Any) -> float:
@@ -310,18 +310,18 @@ def across(points: Floats, point: Floats, direction: Floats) -> Floats:
     return components
 
 
-def sections_told(sections: Sequence[Section]) -> list[dict[str, Any]]:
+def section_details(sections: Sequence[Section]) -> list[dict[str, Any]]:
     """Sections with centre, radius, residuals, as plain values."""
     details = []
     for section, centre in zip(sections, centres_of(sections), strict=True):
         if centre.circle is None:
             details.append({"centre": centre.at.tolist(), "height": section.height, "radius": None, "residuals": []})
         else:
-            details.append(_circle_told(centre.circle, section))
+            details.append(_circle_details(centre.circle, section))
     return details
 
 
-def _circle_told(circle: Circle, section: Section) -> dict[str, Any]:
+def _circle_details(circle: Circle, section: Section) -> dict[str, Any]:
     return {
         "centre": circle.centre.tolist(),
         "height": section.height,
@@ -331,7 +331,7 @@ def _circle_told(circle: Circle, section: Section) -> dict[str, Any]:
     }
 
 
-def axis_told(element: Any) -> dict[str, Any]:
+def axis_details(element: Any) -> dict[str, Any]:
     """An axis or plane as plain values."""
     return {
         "point": element.point.tolist(),

@@ -23,12 +23,12 @@ from app.core.geometry.form import (
     ProbedFeature,
     Value,
     across,
+    axis_details,
     axis_straightness,
-    axis_told,
     flatness,
     replaced,
     roundness,
-    sections_told,
+    section_details,
     straightness,
 )
 from app.core.geometry.form_uncertainty import zone_multipliers
@@ -120,13 +120,13 @@ def coaxiality(feature: ProbedFeature, datum: ProbedFeature, axis: Element) -> F
     rests = float(unit @ axis.cofactors.mean(axis=0) @ unit) / len(axis.points) + lever**2 * float(
         unit @ axis.tilt @ unit
     )
-    details_of_sections = sections_told(feature.sections)
+    details_of_sections = section_details(feature.sections)
     for section, off in zip(details_of_sections, away.tolist(), strict=True):
         section["off"] = off
     details = {
         "sections": details_of_sections,
-        "datum": axis_told(axis),
-        "datum_sections": sections_told(datum.sections),
+        "datum": axis_details(axis),
+        "datum_sections": section_details(datum.sections),
     }
     value = Value(Method.LEAST_SQUARES, 2 * float(distances[worst]), 4 * (own + rests))
     return Form((value,), in_bore(feature.sections), details=details)
@@ -141,7 +141,7 @@ def position(feature: ProbedFeature, nominal: Point) -> Form:
     distances = np.linalg.norm(away, axis=1)
     worst = int(distances.argmax())
     unit = away[worst] / distances[worst] if distances[worst] > 0 else np.array([1.0, 0.0])
-    details_of_sections = sections_told(feature.sections)
+    details_of_sections = section_details(feature.sections)
     for section, off in zip(details_of_sections, away.tolist(), strict=True):
         section["off"] = off
     own = float(unit @ centres[worst].cofactors @ unit)
@@ -170,15 +170,15 @@ def orientation(task: Task, datum: Element) -> Form:
     values = (tilted, zone) if task.length else (zone, tilted)
     suspicion = in_bore(task.feature.sections) if feature.lengthwise else in_plane(task.feature.points)
     details: dict[str, Any] = {
-        "feature": axis_told(feature),
-        "datum": axis_told(datum),
+        "feature": axis_details(feature),
+        "datum": axis_details(datum),
         "angle": float(np.degrees(np.arcsin(min(1.0, sine)))),
         "length": length,
     }
     if feature.lengthwise:
         about = feature.points - feature.point
         wrong = across(about, np.zeros(3), d) if agree else np.outer(about @ d, d)
-        details_of_sections = sections_told(task.feature.sections)
+        details_of_sections = section_details(task.feature.sections)
         for section, out in zip(details_of_sections, wrong.tolist(), strict=True):
             section["off"] = out
         details["sections"] = details_of_sections

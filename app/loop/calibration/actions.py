@@ -343,7 +343,7 @@ def set_plan(
     before = {name: getattr(plan, name) for name in settings}
     for name, value in settings.items():
         setattr(plan, name, value)
-    plan.told = False
+    plan.alarm_raised = False
     session.flush()
     subject = f"calibration-plan/{machine.key}/{place.memory}/{place.location}"
     audit(session, caller.name, "calibration planned", subject, before, settings)

@@ -55,7 +55,7 @@ JOB = PeriodicJob("calibrations_due", overdue, raise_overdue)
 
 def _raise(session: Session, row: RowMapping) -> dict[str, Any]:
     plan = session.get_one(CalibrationPlan, (row["machine_id"], row["memory"], row["location"]), populate_existing=True)
-    plan.told = True
+    plan.alarm_raised = True
     by_parts = row["due_parts"] is not None and (row["parts"] or 0) >= row["due_parts"]
     data = {
         "memory": row["memory"],

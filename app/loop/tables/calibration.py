@@ -65,7 +65,7 @@ class CalibrationPlan(Base):
     """Planned interval of calibration of a place, and what has passed since the last one.
 
     since: the last calibration that was not refused, or when the plan was made. counts: how far the characteristics of
-    the machine had counted then, by their id. `due_parts` and `due_days` are None where nothing is planned. told: the
+    the machine had counted then, by their id. `due_parts` and `due_days` are None where nothing is planned. alarm_raised: the
     alarm *calibration overdue* was raised since then.
     """
 
@@ -83,7 +83,7 @@ class CalibrationPlan(Base):
     acceptance: Mapped[str] = mapped_column(server_default="accept")
     since: Mapped[datetime] = mapped_column(server_default=func.now())
     counts: Mapped[dict[str, Any]] = mapped_column(server_default="{}")
-    told: Mapped[bool] = mapped_column(server_default="false")
+    alarm_raised: Mapped[bool] = mapped_column("told", server_default="false")
 
 
 class PairedReading(Base):

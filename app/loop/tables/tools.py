@@ -39,7 +39,7 @@ class Tool(Base):
     planned_parts: Mapped[int | None]
     planned_total: Mapped[float | None]  # wear life: the sum of corrections at which the edge is spent
     sister: Mapped[int | None]  # R10 of the tool that goes on when this one is worn
-    life_told: Mapped[bool] = mapped_column(server_default="false")  # the alarm of this life was raised
+    life_alarm_raised: Mapped[bool] = mapped_column("life_told", server_default="false")
 
 
 class ToolEvent(Base):

@@ -157,7 +157,7 @@ def _set_offset(
     on_it = (Stream.machine_id == machine.id) & (Stream.tool_memory == number)
     begun: dict[str, Any] = {"level": None, "level_sequence": None, "gain_from": Stream.sequence}
     if kind == "change":
-        tool.total, tool.changed_at, tool.parts_kept, tool.life_told = 0.0, now, 0, False
+        tool.total, tool.changed_at, tool.parts_kept, tool.life_alarm_raised = 0.0, now, 0, False
         begun["sequence_at_tool_change"] = Stream.sequence
     session.execute(update(Stream).where(on_it).values(begun).execution_options(synchronize_session=False))
     session.add(

@@ -42,7 +42,7 @@ def describe_tool(session: Session, machine: Machine, number: int, settings: Too
     for name, value in changes.items():
         setattr(tool, name, value)
     if {"planned_parts", "planned_total"} & {name for name in changes if changes[name] != before[name]}:
-        tool.life_told = False
+        tool.life_alarm_raised = False
     record(session, caller.name, "tool described", f"tool/{machine.key}/{number}", before, changes)
     publish(session, tool_changed(machine, number))
     return tool

@@ -90,7 +90,7 @@ def tell_tool_life(session: Session, unit: Unit) -> None:
     machine_id, number = (int(part) for part in unit.key)
     lock_machines(session, [machine_id])
     for tool, machine, parts, use in _spent(session, machine_id, number):
-        tool.life_told = True
+        tool.life_alarm_raised = True
         alarm = alarms.raise_for_tool(
             session,
             machine.id,
@@ -128,7 +128,7 @@ def _spent(session: Session, machine_id: int | None = None, number: int | None =
     planned = session.execute(
         select(Tool, Machine, Tool.parts_kept + func.coalesce(cut, 0))
         .join(Machine, Machine.id == Tool.machine_id)
-        .where(or_(Tool.planned_parts.is_not(None), Tool.planned_total.is_not(None)), ~Tool.life_told)
+        .where(or_(Tool.planned_parts.is_not(None), Tool.planned_total.is_not(None)), ~Tool.life_alarm_raised)
         .where(true() if machine_id is None else Tool.machine_id == machine_id)
         .where(true() if number is None else Tool.number == number)
         .order_by(Tool.machine_id, Tool.number)

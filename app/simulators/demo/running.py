@@ -72,7 +72,7 @@ class Line:
         self._ending = ending
         self._causes = causes  # numbers of the catalogue by kind of alarm
         self._changed_at: dict[int, str | None] = {}
-        self._fault_told = False  # the machine was ordered to stop because of what its dirty stylus measured
+        self._ordered_to_stop = False  # the machine was ordered to stop because of what its dirty stylus measured
         self._set_aside = self._photographed = False
         self._patience: dict[str, float] = {}  # what waits for a person, and until when we leave it to others
         self.pace = Pace(1.0, datetime.now(UTC), 0.0)
@@ -195,9 +195,9 @@ class Line:
         alarms = self._active_alarms()
         self._look_after(alarms)
         kinds = {alarm["kind"] for alarm in alarms}
-        if machine.dirt and "probe_fault" not in kinds and self._fault_told:
+        if machine.dirt and "probe_fault" not in kinds and self._ordered_to_stop:
             machine.clean_stylus()
-            self._fault_told = False
+            self._ordered_to_stop = False
         if kinds & STOPS:
             machine.stand(machine.at + machine.spec.cycle)
             if "probe_fault" not in kinds:
@@ -211,7 +211,7 @@ class Line:
         """One reading after the other; a machine that is ordered to stop does not go on probing."""
         for probe in probes:
             if self._gateway.push(self._reading(probe)).action == "stop":
-                self._fault_told = True
+                self._ordered_to_stop = True
                 return
 
     def _reading(self, probe: Probe, *, past: bool = False) -> Reading:

@@ -43,7 +43,7 @@ class Line:
         found = self.shop.call("GET", f"/signals?characteristic={self.key}&state={state}")["items"]
         return sorted(found, key=lambda each: each["id"])
 
-    def told(self, state: str = "all") -> list[tuple[str, str, int, int]]:
+    def runs(self, state: str = "all") -> list[tuple[str, str, int, int]]:
         return [
             (each["chart"], each["rule"], each["first_sequence"], each["last_sequence"]) for each in self.signals(state)
         ]

@@ -78,7 +78,7 @@ def test_one_reading_is_a_period_and_the_next_ones_are_judged(line: Line) -> Non
     assert made["version"] == 1
     line.push([3.1])
     line.look()
-    assert ("individuals", "nelson_1", 61, 61) in line.told()
+    assert ("individuals", "nelson_1", 61, 61) in line.runs()
     again = line.shop.call(
         "POST", f"{path}/preview", quantity="deviation", first_sequence=1, last_sequence=60, limits=TEA
     )

@@ -123,7 +123,7 @@ class TestPreview:
         line.push(values)
         line.look()
         tried = get(line, f"/preview?last={len(values)}")["rules"]
-        kept = [(chart, rule) for chart, rule, *_ in line.told()]
+        kept = [(chart, rule) for chart, rule, *_ in line.runs()]
         assert len(kept) > 10
         for each in tried:
             if each["place"] == "main":

@@ -16,7 +16,7 @@ def test_by_default_points_beyond_the_limits_are_kept_and_nobody_is_alarmed(shop
     line = Line(shop)
     line.push([0.0, 6.5, 6.5, 0.0, -7.0])
     line.look()
-    assert line.told() == [("individuals", "nelson_1", 62, 63), ("individuals", "nelson_1", 65, 65)]
+    assert line.runs() == [("individuals", "nelson_1", 62, 63), ("individuals", "nelson_1", 65, 65)]
     assert [each["side"] for each in line.signals()] == ["above", "below"]
     assert line.signals()[0]["points"] == 2
     assert line.alarms("all") == []
@@ -38,7 +38,7 @@ def test_a_run_that_goes_on_stays_one_signal_and_grows(shop: Shop) -> None:
     assert grown["last_at"] > first["last_at"]
     line.push([-0.5] * 9)
     line.look()
-    assert line.told() == [("individuals", "nelson_2", 61, 73), ("individuals", "nelson_2", 74, 82)]
+    assert line.runs() == [("individuals", "nelson_2", 61, 73), ("individuals", "nelson_2", 74, 82)]
 
 
 EVERY: dict[str, Any] = {
@@ -57,9 +57,9 @@ def test_looking_often_finds_what_looking_once_finds(shop: Shop) -> None:
         often.look()
     once.push(values)
     once.look()
-    assert len(once.told()) > 20
-    assert {chart for chart, *_ in once.told()} == {"individuals", "moving_range", "ewma", "moving_average", "cusum"}
-    assert sorted(often.told()) == sorted(once.told())
+    assert len(once.runs()) > 20
+    assert {chart for chart, *_ in once.runs()} == {"individuals", "moving_range", "ewma", "moving_average", "cusum"}
+    assert sorted(often.runs()) == sorted(once.runs())
 
 
 def test_the_border_of_a_chunk_hides_no_signal(shop: Shop, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -72,7 +72,7 @@ def test_the_border_of_a_chunk_hides_no_signal(shop: Shop, monkeypatch: pytest.M
         line.rules(**EVERY)
         line.push(values)
         line.look()
-        told.append(sorted(line.told()))
+        told.append(sorted(line.runs()))
     assert len(told[0]) > 20
     assert all(found == told[0] for found in told)
 
@@ -82,19 +82,19 @@ def test_nothing_is_told_of_before_the_baseline_or_the_rule_unless_asked(shop: S
     line.push([7.0, 0.0, 0.0])
     line.freeze(1, 60)
     line.look()
-    assert line.told() == []
+    assert line.runs() == []
     line.push([8.0])
     line.look()
-    assert line.told() == [("individuals", "nelson_1", 64, 64)]
+    assert line.runs() == [("individuals", "nelson_1", 64, 64)]
     line.rules(main={"nelson_1": "alarm", "nelson_5": "alarm"})
     line.push([5.0, 5.0])
     line.look()
-    assert line.told()[1:] == [("individuals", "nelson_5", 65, 66)]
+    assert line.runs()[1:] == [("individuals", "nelson_5", 65, 66)]
     line.rules(main={"nelson_1": "alarm", "nelson_5": "alarm"}, look_back=True)
     line.look()
-    assert ("individuals", "nelson_1", 61, 61) in line.told()
-    assert ("individuals", "nelson_5", 64, 66) in line.told()
-    assert len(line.told()) == 3
+    assert ("individuals", "nelson_1", 61, 61) in line.runs()
+    assert ("individuals", "nelson_5", 64, 66) in line.runs()
+    assert len(line.runs()) == 3
     assert [alarm["data"]["signals"][0]["first"] for alarm in line.alarms()] == [64]
 
 
@@ -103,10 +103,10 @@ def test_an_excluded_reading_takes_its_signal_with_it(shop: Shop) -> None:
     line.rules(main={"nelson_1": "watch", "nelson_2": "watch"})
     line.push([0.5, 0.5, 9.0, *[0.5] * 7, -0.5])
     line.look()
-    assert sorted(line.told("open")) == [("individuals", "nelson_1", 63, 63), ("individuals", "nelson_2", 61, 70)]
+    assert sorted(line.runs("open")) == [("individuals", "nelson_1", 63, 63), ("individuals", "nelson_2", 61, 70)]
     line.exclude(63)
     line.look()
-    assert line.told("withdrawn") == [("individuals", "nelson_1", 63, 63)]
+    assert line.runs("withdrawn") == [("individuals", "nelson_1", 63, 63)]
     (run,) = line.signals("open")
     assert (run["points"], run["excluded"], run["first_sequence"], run["last_sequence"]) == (9, 1, 61, 70)
     line.exclude(64)
@@ -114,7 +114,7 @@ def test_an_excluded_reading_takes_its_signal_with_it(shop: Shop) -> None:
     assert line.signals("open") == []
     line.push([-7.0])
     line.look()
-    assert line.told("open") == [("individuals", "nelson_1", 72, 72)]
+    assert line.runs("open") == [("individuals", "nelson_1", 72, 72)]
 
 
 def test_another_baseline_judges_from_then_on_and_what_was_found_stays(shop: Shop) -> None:
@@ -138,11 +138,11 @@ def test_rules_that_are_off_find_nothing_and_what_they_found_stays(shop: Shop) -
     line.rules(main={})
     line.push([7.0, 7.0])
     line.look()
-    assert line.told() == [("individuals", "nelson_1", 61, 61)]
+    assert line.runs() == [("individuals", "nelson_1", 61, 61)]
     line.rules(main={"nelson_1": "watch"})
     line.push([7.0])
     line.look()
-    assert line.told() == [("individuals", "nelson_1", 61, 61), ("individuals", "nelson_1", 64, 64)]
+    assert line.runs() == [("individuals", "nelson_1", 61, 61), ("individuals", "nelson_1", 64, 64)]
 
 
 def test_subgroups_are_watched_when_they_are_complete(shop: Shop) -> None:
@@ -150,10 +150,10 @@ def test_subgroups_are_watched_when_they_are_complete(shop: Shop) -> None:
     line.rules(main={"nelson_1": "watch"}, scatter={"nelson_1": "watch"})
     line.push([9.0, 9.0])
     line.look()
-    assert line.told() == []
+    assert line.runs() == []
     line.push([9.0, 0.0, 0.0, 30.0, 0.0])
     line.look()
-    assert line.told() == [("xbar", "nelson_1", 61, 66), ("ranges", "nelson_1", 64, 66)]
+    assert line.runs() == [("xbar", "nelson_1", 61, 66), ("ranges", "nelson_1", 64, 66)]
 
 
 def test_an_alarm_names_rule_chart_and_run_and_is_raised_once(shop: Shop) -> None:
@@ -276,5 +276,5 @@ def test_what_is_read_in_chunks_finds_the_same_at_their_borders(
     pieces.push(values)
     monkeypatch.setattr(signals_actions, "CHUNK", chunk)
     pieces.look()
-    assert len(whole.told()) > 10
-    assert sorted(pieces.told()) == sorted(whole.told())
+    assert len(whole.runs()) > 10
+    assert sorted(pieces.runs()) == sorted(whole.runs())
