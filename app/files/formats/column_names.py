@@ -63,15 +63,15 @@ NAMES: dict[str, tuple[str, ...]] = {
         "единица", "единица измерения", "ед изм", "јединица",
     ),
     "nominal": (
-        "nominal", "nominal value", "nominal size", "soll", "sollwert", "sollmass", "nennmass", "nominalna vrednost", "nazivna mera",
+        "nominal", "nominal value", "nominal size", "nom", "design value", "soll", "sollwert", "sollmass", "nennmass", "nominalna vrednost", "nazivna mera",
         "номинал", "номинальное значение",
     ),
     "upper": (
-        "uppertol", "upper tol", "upper tolerance", "upper deviation", "+tol", "plus tol", "oberes abmass", "obere toleranz",
+        "uppertol", "upper tol", "up tol", "uptol", "upper limit tol", "ob tol", "obere tol", "upper tolerance", "upper deviation", "+tol", "plus tol", "oberes abmass", "obere toleranz",
         "gornje odstupanje", "zgornje odstopanje", "верхнее отклонение", *UPPER_LIMITS,
     ),
     "lower": (
-        "lowertol", "lower tol", "lower tolerance", "lower deviation", "unteres abmass", "untere toleranz",
+        "lowertol", "lower tol", "low tol", "lowtol", "lower limit tol", "un tol", "unt tol", "untere tol", "lower tolerance", "lower deviation", "unteres abmass", "untere toleranz",
         "donje odstupanje", "spodnje odstopanje", "нижнее отклонение", *LOWER_LIMITS,
     ),
     "natural_limit": (

@@ -105,15 +105,17 @@ _OTHERS: Final = frozenset(
 """Words of units that are not known, of none of length, or of whole systems; at the end of a name and in brackets."""
 _OTHER_SYSTEMS: Final = _OTHERS - OTHER_UNITS - {"my", "col", "counts"}
 _OTHER_AT_END: Final = re.compile(
-    rf"(?:[-_,;/ .:=|]|(?<=\d))({'|'.join(map(re.escape, sorted(_OTHERS)))})$|(?<=\S[ .-])(in\.?|ins)$|^(um|mils?|in(?=_[a-z]?\d))_",
+    rf"(?:[-_,;/ .:=|]|(?<=\d))({'|'.join(map(re.escape, sorted(_OTHERS)))})$|(?<=\S[ .-])(in\.?|ins)$|^(um|mils?|in(?=_[a-z]?\d))_"
+    r"|(?<![^\W\d_])(angle|winkel|ugao|угол|угао)[ _]?\d*$",
     re.IGNORECASE,
 )
-"""Those, and *in* where it may be inches as well as a word: *Bore in*."""
+"""Those, *in* where it may be inches as well as a word (*Bore in*), and names of angles."""
 _AXES: Final = frozenset("xyzuvwijkrdlpt")
 """Letters in square brackets that say which size it is: *CIR1 [X]*."""
 _NO_UNITS: Final = (
     {*"xyzabcuvwijkrdln", "id", "max", "min", "avg", "mean", "med", "std", "ist", "soll", "act", "nom", "dia", "abs", "rel"}
-    | {"dev", "ok", "nok", "raw", "ref"}
+    | {"dev", "ok", "nok", "raw", "ref", "bore", "boss", "hole", "slot", "pin", "web", "key", "rib", "top", "mid", "left", "back", "side"}
+    | {"face", "end", "low", "high", "deep", "flat", "loc", "pos", "cir", "nest", "lsl", "usl", "oben", "vorn", "od"}
 )  # fmt: skip
 """Words in round brackets that say which size it is, and in no unit."""
 
@@ -215,7 +217,7 @@ def unit_in(header: str) -> str | None:
     if len(set(map(length_unit, named))) > 1:
         raise UnknownUnit(", ".join(named))
     if not named and (match := _OTHER_AT_END.search(header)):
-        raise UnknownUnit(match[1] or match[2] or match[3])
+        raise UnknownUnit(next(filter(None, match.groups())))
     return length_unit(named[0]) if named else None
 
 

@@ -34,7 +34,7 @@ def test_what_is_no_length_is_none(word: str) -> None:
         ("D40:in", "in"), ("Diamètre (pouces)", "in"), ("Prečnik u inčima", "in"), ("Диаметр в дюймах", "in"), ("Prečnik (mikrona)", "um"),
         ("BoreUm", "um"), ("D40-um", "um"), ("D40 mikron", "um"), ("D40 micro meter", "um"), ("valueMils", "mil"), ("D40 milli inch", "mil"),
         ("Ra micro inch", "uin"), ('Ra µ"', "uin"), ("Ø 40 ±0,01 mm", "mm"), ("Flatness 0.01 mm", "mm"), ("M8x100", None), ("Bohrung E-3", None),
-        ("Micrometer reading", None), ("in_feed", None), ("Position in X", None), ("My size", None), ("Max100", None), ('Bore "top"', None),
+        ("Micrometer reading", None), ("in_feed", None), ("Position in X", None), ("My size", None), ("CIRCLE1(Bore) X", None), ("Rectangle 1", None), ("Angle plate height", None), ("Max100", None), ('Bore "top"', None),
     ],
 )  # fmt: skip
 def test_the_unit_of_a_header(header: str, unit: str | None) -> None:
@@ -77,7 +77,7 @@ def test_the_unit_of_a_header(header: str, unit: str | None) -> None:
         "10ths",
         "Écart en centièmes",
     ]
-    + ["Area [mm²]", "Area mm^2", "Feed mm/min", "Size (mm or in)", "Size mm/inch"],
+    + ["Area [mm²]", "Area mm^2", "Feed mm/min", "CONE1(Inside) Angle", "Winkel_2", "Size (mm or in)", "Size mm/inch"],
 )
 def test_a_unit_that_is_no_length_is_never_taken_for_mm(header: str) -> None:
     with pytest.raises(UnknownUnit):

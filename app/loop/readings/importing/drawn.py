@@ -75,6 +75,9 @@ def _limits(name: str, drawn: Drawn, layout: Layout) -> tuple[float | None, floa
     if lower is not None and upper is not None and lower > 0 and sizes[0] != lower:
         words = _("its {column} is above 0: a deviation, or one without its sign? Nobody can tell")
         raise _Wrong(words.format(column=layout.named("lower")))
+    if nominal and upper is not None and sizes[1] == upper and abs(upper) < abs(nominal) / 2:
+        words = _("its {column} is a size by its name, and far from the nominal size: a deviation? Nobody can tell")
+        raise _Wrong(words.format(column=layout.named("upper")))
     return nominal, sizes[0], sizes[1]
 
 

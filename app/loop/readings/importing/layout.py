@@ -248,6 +248,7 @@ def _csv_layout(path: Path, wishes: Wishes, zone: ZoneInfo | None, kind: str = "
     top = list(islice(rows, TOP))
     if not top:
         raise wrong("file", _("The file is empty."))
+    _refuse_no_table(top[0].cells[0])
     found = heading(top, wishes.header_line, ragged=kind == "sheet")
     if found is None:
         words = _("Line {n} is empty, or too far below to be the header of the columns.")
@@ -293,6 +294,15 @@ def _csv_layout(path: Path, wishes: Wishes, zone: ZoneInfo | None, kind: str = "
         (row.line, row.cells) for row in rows_of(path, made) if isinstance(row, Row) and tuple(row.cells) != header
     )
     return replace(_timed(made, _times(made, below, rows)), drawn=_drawn(made, named))
+
+
+def _refuse_no_table(begin: str) -> None:
+    """Refuse what is no table by its first cell."""
+    if begin.startswith("K0100 "):
+        raise wrong("file", _("This is AQDEF (Q-DAS): import it under a name that ends with .dfq."))
+    for mark, kind in (("<?xml", "XML"), ("<html", "HTML"), ("<!doctype", "HTML"), ("%pdf", "PDF"), ("{\\rtf", "RTF")):
+        if begin.lower().startswith(mark):
+            raise wrong("file", _("This is {kind}, no table: export one as CSV or XLSX.").format(kind=kind))
 
 
 def _above(titles: Sequence[Sequence[str]]) -> tuple[str | None, str]:

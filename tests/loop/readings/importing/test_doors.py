@@ -599,6 +599,14 @@ def test_of_such_a_table_what_is_missing_is_set_up_with_its_limits(plant: Plant,
         ("Feature;Meas;Nominal;+TOL;-TOL", "A;16.001;16;0.010;0.020", (16.0, 15.98, 16.01)),
         ("Feature;Meas;Nominal;USL;LSL", "A;16.001;16;16.010;15.990", (16.0, 15.99, 16.01)),
         ("Feature;Meas;USL;LSL", "A;16.001;16.010;15.990", (None, 15.99, 16.01)),
+        ("Element;Actual;Nominal;Up.Tol;Low.Tol", "A;16.001;16;0.010;-0.020", (16.0, 15.98, 16.01)),
+        ("Name;Istwert;Sollwert;Ob.Tol.;Un.Tol.", "Ring (Bore);16.001;16;0.010;-0.020", (16.0, 15.98, 16.01)),
+        (
+            "Feature;Measured value;Design value;Upper limit;Lower limit",
+            "A;16;16;0.01;-0.01",
+            "far from the nominal size",
+        ),
+        ("Feature;Axis;Nominal;Meas;+Tol;-Tol", "CONE1;Angle;30;30.001;0.1;-0.1", "names the unit 'Angle'"),
         ("Feature;Meas;Nominal;Upper Tol;Lower Tol;Unit", "A;0.5;0.5;0.001;-0.001;inch", (12.7, 12.6746, 12.7254)),
         ("Feature;Meas;Nominal [in];Upper Tol [µm];Lower Tol [µm]", "A;0.5;0.5;10;-10", (12.7, 12.69, 12.71)),
         ("Feature;Meas;Nominal;Upper Tol;Lower Tol", "A;16.001;16;0.010;0.005", "is above 0: a deviation"),
@@ -615,7 +623,8 @@ def test_of_such_a_table_what_is_missing_is_set_up_with_its_limits(plant: Plant,
 def test_the_limits_of_a_row(tmp_path: Path, head: str, row: str, found: tuple[float | None, ...] | str) -> None:
     path = tmp_path / "a.csv"
     path.write_text(f"{head}\n{row}\n")
-    [content] = drawn.contents(look(path, Wishes()))
+    named = {} if "Name;" not in head else {"characteristic": "Name"}
+    [content] = drawn.contents(look(path, Wishes(mapping=named)))
     if isinstance(found, str):
         assert found in content.not_new
     else:

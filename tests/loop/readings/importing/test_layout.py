@@ -481,3 +481,14 @@ def test_a_table_with_parts_across_says_how_to_turn_it_round(tmp_path: Path, tex
 def test_other_tables_without_a_measured_column_are_no_turned_ones(tmp_path: Path, text: str) -> None:
     with pytest.raises(Invalid, match="No column is recognised as the measured value"):
         look(write(tmp_path, text), Wishes())
+
+
+@pytest.mark.parametrize(
+    ("begin", "words"),
+    [("K0100 1\nK1001 4711\n", ".dfq"), ("<?xml version='1.0'?>\n<a/>\n", "XML"), ("%PDF-1.4\n1 0 obj\n", "PDF")],
+)
+def test_what_is_no_table_is_said_to_be_what_it_is(tmp_path: Path, begin: str, words: str) -> None:
+    path = tmp_path / "a.txt"
+    path.write_text(begin)
+    with pytest.raises(Invalid, match=words):
+        look(path, Wishes())
