@@ -268,9 +268,13 @@ def _contradictions(machine: Machine, place: str) -> Iterator[str]:
     memories = [location.tool_memory for location in machine.location]
     for memory in sorted({memory for memory in memories if memories.count(memory) > 1}):
         yield f"{place}: tool memory {memory} has several locations; one register holds one tool memory."
-    registers = [(location.tool, location.edge, location.register) for location in machine.location]
-    for tool, edge, register in sorted({each for each in registers if registers.count(each) > 1}):
-        yield f"{place}: {register} of tool {tool}, edge {edge} covers several tool memories."
+    named = getattr(kind_named(machine.kind), "REGISTER_OF", ("tool", "edge"))
+    registers = [
+        " of ".join(filter(None, (at.register, ", ".join(f"{name} {getattr(at, name)}" for name in named))))
+        for at in machine.location
+    ]
+    for register in sorted({each for each in registers if registers.count(each) > 1}):
+        yield f"{place}: {register} covers several tool memories."
     if machine.corrections != "none" and not machine.location:
         yield (
             f"{place} takes corrections (corrections = {machine.corrections!r}) but has no location: add"

@@ -123,6 +123,23 @@ def test_one_register_stands_for_one_tool_memory_and_one_key_for_one_machine() -
         read(GOOD[: GOOD.index("[[machine")])
 
 
+@pytest.mark.parametrize(
+    ("kind", "settings", "register", "other"),
+    [
+        ("heidenhain", '{ address = "192.0.2.23" }', "QR31", "tool = 4"),  # the offset of both tools
+        ("haas", '{ address = "192.0.2.17" }', "wear_diameter", "tool = 3\nedge = 2"),  # it has no edges
+    ],
+)
+def test_a_register_is_one_whatever_tool_or_edge_is_named(kind: str, settings: str, register: str, other: str) -> None:
+    text = GOOD.replace('kind = "tried"', f'kind = "{kind}"').replace("tried = { port = 7 }", f"{kind} = {settings}")
+    text = text.replace("wear_length_1", register)
+    second = text[text.index("[[machine") :].replace("tool_memory = 3", "tool_memory = 4").replace("tool = 3", other)
+    with pytest.raises(ConfigurationError, match=f"{register}.* covers several tool memories"):
+        read(text + second)
+    another = "QR32" if kind == "heidenhain" else "wear_length"
+    assert len(read(text + second.replace(register, another)).machines[0].location) == 2
+
+
 def test_a_file_that_cannot_be_read_is_said(tmp_path: Path) -> None:
     for content, words in ((None, "cannot be read"), (b"\xff", "not UTF-8"), (b"[server", "is not TOML")):
         file = tmp_path / "plant.toml"

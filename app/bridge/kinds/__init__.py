@@ -1,8 +1,9 @@
 """Kinds of controls, by the name that the configuration gives them.
 
 Each module has ``Settings`` (a msgspec Struct: the kind's own table), ``link(machine)``, and ``NUMBERED = True`` where the
-control knows characteristics by numbers, and ``MEANING``: names of settings that change the meaning of a register, which a
-touch test has to prove again. It is imported when a machine needs it: some need a library that is an extra.
+control knows characteristics by numbers, ``REGISTER_OF``: what of a location its register belongs to besides its name (tool and
+edge, if nothing is said), and ``MEANING``: names of settings that change the meaning of a register, which a touch test has to
+prove again. It is imported when a machine needs it: some need a library that is an extra.
 """
 
 from importlib import import_module

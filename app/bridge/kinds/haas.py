@@ -25,6 +25,7 @@ from app.bridge.registers import RegisterLink
 from app.core.ring import Register
 
 NUMBERED = True
+REGISTER_OF = ("tool",)
 PARAMETERS: Final = {"wear_length": 2200, "wear_diameter": 2600, "wear_x": 2700, "wear_z": 2800}
 """Registers of a tool: that of tool T is variable #[number + T]. A mill has the first two, a lathe the others."""
 TOOLS: Final = {"wear_length": 200, "wear_diameter": 200, "wear_x": 50, "wear_z": 50}

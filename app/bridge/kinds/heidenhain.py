@@ -30,6 +30,7 @@ from app.core.printed_line import DECIMALS, MODULUS, LineReader, Printed
 from app.core.ring import STEPS, Unit
 
 NUMBERED = True
+REGISTER_OF = ()
 LARGE = 500_000  # bytes: a file that is fetched whole each time it grows should be emptied now and then
 REGISTER = re.compile(r"QR([1-9]\d{1,2})")
 FIRST_REGISTER, LAST_REGISTER = 10, 499  # QR0 to QR9 are for the counters
