@@ -30,10 +30,11 @@ PYTHON ?= $(shell for each in python3 python3.14 python3.13 python3.12 python3.1
 run: $(VENV)/installed
 	@exec $(BIN)/inband demo $(ARGS)
 
-# While lint looks at types on one core, the other one compiles what all workers of the tests would at once.
+# Once in a clone: while lint looks at types on one core, the other one compiles what all workers of the tests would at once.
 test: $(VENV)/browser
 	@$(MAKE) -s lint & lint=$$!; \
-	{ $(BIN)/python -m tests.preloaded && $(BIN)/pytest -qq --collect-only; } > $(VENV)/prepared.txt 2>&1; \
+	test -e $(VENV)/prepared.txt \
+		|| { $(BIN)/python -m tests.preloaded && $(BIN)/pytest -qq --collect-only; } > $(VENV)/prepared.txt 2>&1 || true; \
 	wait $$lint
 	@$(BIN)/pytest -n auto --dist worksteal $(ARGS)
 
