@@ -15,7 +15,6 @@ ExpireAfter = Annotated[
         strict=True,
         gt=0,
         le=87_600,
-        allow_inf_nan=False,
         description="Hours after which a correction that was not applied is superseded; null: never.",
     ),
 ]
@@ -24,14 +23,7 @@ SignalWay = Annotated[
     Field(description="How the probe's signal comes to the control: directly, or through the PLC, which delays it."),
 ]
 Delay = Annotated[
-    float,
-    Field(
-        strict=True,
-        ge=0,
-        le=1000,
-        allow_inf_nan=False,
-        description="Of the way through the PLC, ms; at most 0.25 as a rule.",
-    ),
+    float, Field(strict=True, ge=0, le=1000, description="Of the way through the PLC, ms; at most 0.25 as a rule.")
 ]
 Jitter = Annotated[
     float,
@@ -39,11 +31,10 @@ Jitter = Annotated[
         strict=True,
         ge=0,
         le=1000,
-        allow_inf_nan=False,
         description="By how much the delay varies, ms; null if nobody has measured it: then the whole delay counts.",
     ),
 ]
-Feed = Annotated[float, Field(strict=True, gt=0, le=100_000, allow_inf_nan=False, description="Probing feed, mm/min.")]
+Feed = Annotated[float, Field(strict=True, gt=0, le=100_000, description="Probing feed, mm/min.")]
 Type = Annotated[
     Literal["lathe", "mill", "mill_turn", "grinder", "other"],
     Field(description="Kind of machine tool; variants that do not fit it are warned of."),
@@ -60,7 +51,6 @@ PlausibleTurn = Annotated[
         strict=True,
         gt=0,
         le=180,
-        allow_inf_nan=False,
         description="Degrees. An alignment or work zero that turns the part by more is warned of.",
     ),
 ]
@@ -70,20 +60,12 @@ PlausibleShift = Annotated[
         strict=True,
         gt=0,
         le=LARGEST_LENGTH,
-        allow_inf_nan=False,
         description="mm. An alignment that shifts the part by more, and a work zero that lies further from that of its "
         "fixture, is warned of.",
     ),
 ]
 PlausibleAxisTurn = Annotated[
-    float,
-    Field(
-        strict=True,
-        gt=0,
-        le=180,
-        allow_inf_nan=False,
-        description="Degrees. A rotary axis that leans by more is warned of.",
-    ),
+    float, Field(strict=True, gt=0, le=180, description="Degrees. A rotary axis that leans by more is warned of.")
 ]
 PlausibleAxisShift = Annotated[
     float,
@@ -91,7 +73,6 @@ PlausibleAxisShift = Annotated[
         strict=True,
         gt=0,
         le=LARGEST_LENGTH,
-        allow_inf_nan=False,
         description="mm. A rotary axis that lies further from where its kinematics has it is warned of.",
     ),
 ]
