@@ -133,15 +133,9 @@ def _place(name: str, head: str) -> dict[str, Any]:
 
 
 def _settle(session: Session, machine: Machine, name: str, run: KinematicsRun, actor: str = "") -> list[dict[str, Any]]:
-    ended = alarms.settle_for_place(
-        session,
-        machine.id,
-        DRIFT,
-        _place(name, run.head),
-        actor or run.actor,
-        _("Run {number}").format(number=run.id),
-        {"code": "kinematics_run", "number": run.id},
-    )
+    active = alarms.active_of_place(session, machine.id, DRIFT, _place(name, run.head))
+    comment, outcome = _("Run {number}").format(number=run.id), {"code": "kinematics_run", "number": run.id}
+    ended = alarms.settle(session, active, actor or run.actor, comment, outcome)
     return [] if ended is None else [alarms.news(machine.key, ended)]
 
 

@@ -182,7 +182,7 @@ def _watch(session: Session, machine: Machine, zero: WorkZero) -> list[dict[str,
             return []
     comment = _("Work zero {n} is within the limit").format(n=last.zero.id)
     outcome = {"code": "fixture_back", "number": last.zero.id}
-    ended = alarms.settle_for_place(session, machine.id, SHIFTED, about, zero.actor, comment, outcome)
+    ended = alarms.settle(session, active, zero.actor, comment, outcome)
     return [] if ended is None else [alarms.news(machine.key, ended)]
 
 

@@ -3,11 +3,35 @@
 from datetime import UTC, datetime
 from typing import Any
 
-from sqlalchemy import select
+from sqlalchemy import ColumnElement, select
 from sqlalchemy.orm import Session
 
 from app.loop.alarms.kinds import AlarmKind
 from app.loop.tables.alarms import Alarm
+
+
+def active_of_tool(session: Session, machine_id: int, tool_memory: int, kind: AlarmKind) -> Alarm | None:
+    """The alarm of this kind about a tool that is active."""
+    of_tool = (Alarm.tool_memory == tool_memory, Alarm.characteristic_id.is_(None))
+    return _active(session, machine_id, kind, *of_tool)
+
+
+def active(session: Session, machine_id: int, characteristic_id: int, kind: AlarmKind) -> Alarm | None:
+    """The alarm of this kind about a characteristic that is active."""
+    return _active(session, machine_id, kind, Alarm.characteristic_id == characteristic_id)
+
+
+def active_of_place(session: Session, machine_id: int, kind: AlarmKind, data: dict[str, Any]) -> Alarm | None:
+    """The alarm of this kind about a location of a memory (`memory` and `location` in its data) that is active."""
+    place = [Alarm.data[name].astext == str(data[name]) for name in ("memory", "location")]
+    return _active(session, machine_id, kind, *place)
+
+
+def _active(session: Session, machine_id: int, kind: AlarmKind, *about: ColumnElement[bool]) -> Alarm | None:
+    query = select(Alarm).where(
+        Alarm.machine_id == machine_id, Alarm.kind == kind.name, Alarm.acknowledged_at.is_(None), *about
+    )
+    return session.scalars(query.execution_options(populate_existing=True)).one_or_none()
 
 
 def raise_for_tool(session: Session, machine_id: int, tool_memory: int, kind: AlarmKind, data: dict[str, Any]) -> Alarm:
@@ -15,47 +39,8 @@ def raise_for_tool(session: Session, machine_id: int, tool_memory: int, kind: Al
 
     The values of the last time are what its sentence says.
     """
-    active = _active_of_tool(session, machine_id, tool_memory, kind)
+    active = active_of_tool(session, machine_id, tool_memory, kind)
     return _raised(session, active or Alarm(machine_id=machine_id, tool_memory=tool_memory, kind=kind.name), data)
-
-
-def _active_of_tool(session: Session, machine_id: int, tool_memory: int, kind: AlarmKind) -> Alarm | None:
-    return session.scalars(
-        select(Alarm)
-        .where(
-            Alarm.machine_id == machine_id,
-            Alarm.tool_memory == tool_memory,
-            Alarm.kind == kind.name,
-            Alarm.characteristic_id.is_(None),
-            Alarm.acknowledged_at.is_(None),
-        )
-        .execution_options(populate_existing=True)
-    ).one_or_none()
-
-
-def _raised(session: Session, alarm: Alarm, data: dict[str, Any]) -> Alarm:
-    """A new alarm is kept; on one that is active already, one more is counted."""
-    if alarm in session:
-        alarm.count += 1
-    alarm.last_at = datetime.now(UTC)
-    alarm.data = data
-    session.add(alarm)
-    session.flush()
-    return alarm
-
-
-def active(session: Session, machine_id: int, characteristic_id: int, kind: AlarmKind) -> Alarm | None:
-    """The alarm of this kind about a characteristic that is active."""
-    return session.scalars(
-        select(Alarm)
-        .where(
-            Alarm.machine_id == machine_id,
-            Alarm.characteristic_id == characteristic_id,
-            Alarm.kind == kind.name,
-            Alarm.acknowledged_at.is_(None),
-        )
-        .execution_options(populate_existing=True)
-    ).one_or_none()
 
 
 def raise_for_characteristic(
@@ -86,46 +71,19 @@ def raise_for_place(session: Session, machine_id: int, kind: AlarmKind, data: di
     return _raised(session, active or Alarm(machine_id=machine_id, kind=kind.name), data)
 
 
-def settle_for_place(
-    session: Session,
-    machine_id: int,
-    kind: AlarmKind,
-    data: dict[str, Any],
-    by: str,
-    comment: str,
-    outcome: dict[str, Any],
-) -> Alarm | None:
-    """End an alarm about this location, because what it asked for has been done; None if there is none."""
-    return _settled(session, active_of_place(session, machine_id, kind, data), by, comment, outcome)
+def _raised(session: Session, alarm: Alarm, data: dict[str, Any]) -> Alarm:
+    """A new alarm is kept; on one that is active already, one more is counted."""
+    if alarm in session:
+        alarm.count += 1
+    alarm.last_at = datetime.now(UTC)
+    alarm.data = data
+    session.add(alarm)
+    session.flush()
+    return alarm
 
 
-def settle_for_tool(
-    session: Session,
-    machine_id: int,
-    tool_memory: int,
-    kind: AlarmKind,
-    by: str,
-    comment: str,
-    outcome: dict[str, Any],
-) -> Alarm | None:
-    """As `settle_for_place`, of an alarm about a tool."""
-    return _settled(session, _active_of_tool(session, machine_id, tool_memory, kind), by, comment, outcome)
-
-
-def settle_for_characteristic(
-    session: Session,
-    machine_id: int,
-    characteristic_id: int,
-    kind: AlarmKind,
-    by: str,
-    comment: str,
-    outcome: dict[str, Any],
-) -> Alarm | None:
-    """As `settle_for_place`, of an alarm about a characteristic."""
-    return _settled(session, active(session, machine_id, characteristic_id, kind), by, comment, outcome)
-
-
-def _settled(session: Session, active: Alarm | None, by: str, comment: str, outcome: dict[str, Any]) -> Alarm | None:
+def settle(session: Session, active: Alarm | None, by: str, comment: str, outcome: dict[str, Any]) -> Alarm | None:
+    """End an active alarm, because what it asked for has been done; None if there is none."""
     if active is None:
         return None
     active.acknowledged_at, active.acknowledged_by = datetime.now(UTC), by
@@ -140,18 +98,3 @@ def news(machine: str, alarm: Alarm) -> dict[str, Any]:
     if alarm.acknowledged_at is None:
         return event | {"alarm": alarm.kind, "state": "active"}
     return event | {"alarm": alarm.kind, "state": "acknowledged", "action": alarm.action}
-
-
-def active_of_place(session: Session, machine_id: int, kind: AlarmKind, data: dict[str, Any]) -> Alarm | None:
-    """The alarm about this location that nobody has ended."""
-    return session.scalars(
-        select(Alarm)
-        .where(
-            Alarm.machine_id == machine_id,
-            Alarm.kind == kind.name,
-            Alarm.data["memory"].astext == data["memory"],
-            Alarm.data["location"].astext == str(data["location"]),
-            Alarm.acknowledged_at.is_(None),
-        )
-        .execution_options(populate_existing=True)
-    ).one_or_none()

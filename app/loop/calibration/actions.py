@@ -261,10 +261,8 @@ def end_alarms(session: Session, machine: Machine, made: CalibrationRecord) -> l
     about = {"memory": made.memory, "location": made.location}
     comment = _("Calibration {number}").format(number=made.number)
     outcome = {"code": "calibrated", "number": made.number}
-    ended = [
-        alarms.settle_for_place(session, machine.id, kind, about, made.actor, comment, outcome)
-        for kind in (OVERDUE, REFUSED)
-    ]
+    active = [alarms.active_of_place(session, machine.id, kind, about) for kind in (OVERDUE, REFUSED)]
+    ended = [alarms.settle(session, alarm, made.actor, comment, outcome) for alarm in active]
     return [alarms.news(machine.key, alarm) for alarm in ended if alarm is not None]
 
 

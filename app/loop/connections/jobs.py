@@ -62,7 +62,8 @@ def tell(silent_after: timedelta, session: Session, unit: Unit) -> None:
 
 def end(session: Session, machine: Machine, name: str, by: str, comment: str, outcome: str) -> None:
     """End one of these alarms; the machine is locked. Without one nothing happens."""
-    ended = alarms.settle_for_place(session, machine.id, kind_named(name), PLACE, by, comment, {"code": outcome})
+    active = alarms.active_of_place(session, machine.id, kind_named(name), PLACE)
+    ended = alarms.settle(session, active, by, comment, {"code": outcome})
     if ended is not None:
         publish(session, alarms.news(machine.key, ended))
 

@@ -152,9 +152,8 @@ def _end_context(
     session: Session, row: ControlPlan, machine: str, characteristic: str, *, by: str, comment: str, outcome: Any
 ) -> None:
     """End the alarm about missing context; without any nothing happens."""
-    ended = alarms.settle_for_characteristic(
-        session, row.machine_id, row.characteristic_id, CONTEXT_MISSING, by, comment, outcome
-    )
+    active = alarms.active(session, row.machine_id, row.characteristic_id, CONTEXT_MISSING)
+    ended = alarms.settle(session, active, by, comment, outcome)
     if ended is not None:
         publish(session, alarms.news(machine, ended) | {"characteristic": characteristic})
 
@@ -207,8 +206,7 @@ def _end(
     if missed is not None:
         missed.ended_at, missed.until = datetime.now(UTC), outcome.get("sequence")
         session.flush()
-    ended = alarms.settle_for_characteristic(
-        session, row.machine_id, row.characteristic_id, MISSED, by, comment, outcome
-    )
+    active = alarms.active(session, row.machine_id, row.characteristic_id, MISSED)
+    ended = alarms.settle(session, active, by, comment, outcome)
     if ended is not None:
         publish(session, alarms.news(machine, ended) | {"characteristic": characteristic})

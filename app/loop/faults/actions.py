@@ -37,9 +37,8 @@ def report_fault(session: Session, machine: str, fault: Fault, text: str, active
         publish(session, alarms.news(owner.key, raised))
         return Reported(raised.id, True, raised.count, raised.count == 1)
     comment = text or _("The fault is over")
-    ended = alarms.settle_for_place(
-        session, owner.id, MACHINE_FAULT, about, caller.name, comment, {"code": "fault_over", "fault": fault}
-    )
+    active_alarm = alarms.active_of_place(session, owner.id, MACHINE_FAULT, about)
+    ended = alarms.settle(session, active_alarm, caller.name, comment, {"code": "fault_over", "fault": fault})
     if ended is None:
         return Reported(None, False, 0, False)
     record(session, caller.name, "machine fault over", f"alarm/{ended.id}", None, {"fault": fault}, comment)

@@ -89,10 +89,8 @@ class Watch:
             raised = alarms.raise_for_tool(session, machine_id, tool, CORRECTIONS_NOT_TAKEN, _values(waiting))
             publish(session, alarm_raised(machine, raised))
         else:
-            outcome = {"code": "corrections_taken"}
-            ended = alarms.settle_for_tool(
-                session, machine_id, tool, CORRECTIONS_NOT_TAKEN, ACTOR, _("It is over"), outcome
-            )
+            active = alarms.active_of_tool(session, machine_id, tool, CORRECTIONS_NOT_TAKEN)
+            ended = alarms.settle(session, active, ACTOR, _("It is over"), {"code": "corrections_taken"})
             if ended is not None:
                 publish(session, alarms.news(machine.key, ended))
 
