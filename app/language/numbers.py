@@ -171,6 +171,15 @@ def mm(size_mm: float | None, decimals: int = 4) -> str:
     return NOTHING if size_mm is None else f"{fixed(size_mm, decimals)}{NO_BREAK_SPACE}mm"
 
 
+def signed_mm(length_mm: float | None) -> str:
+    r"""An offset in mm, or a deviation beside one, with its sign.
+
+    >>> signed_mm(0.012), signed_mm(None)
+    ('+0.0120\xa0mm', '–')
+    """
+    return NOTHING if length_mm is None else f"{signed(length_mm, 4)}{NO_BREAK_SPACE}mm"
+
+
 def grouped(count: int) -> str:
     """A count as people read it.
 

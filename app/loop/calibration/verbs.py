@@ -9,7 +9,7 @@ from sqlalchemy.orm import Session
 from app.access.callers import Caller
 from app.errors import NotFound
 from app.language.i18n import _, ngettext
-from app.language.numbers import mm, um
+from app.language.numbers import mm, signed_mm, um
 from app.loop.calibration import actions, pairs, queries, wording
 from app.loop.calibration.queries import CalibrationRow, Place
 from app.loop.calibration.schemas import SuggestionAcceptIn
@@ -74,7 +74,7 @@ def _suggested(on: OfPlace) -> dict[str, str]:
 
 def _sets(place: Place, before: float, after: float | None) -> list[str]:
     if place.memory == "tool":
-        return [_("The offset R10 = {n} is set to {after}.").format(n=place.location, after=mm(after))]
+        return [_("The offset R10 = {n} is set to {after}.").format(n=place.location, after=signed_mm(after))]
     return [
         _("The empirical value R11 = {n} goes from {before} to {after}; readings from now on use it.").format(
             n=place.location, before=um(before), after=um(after)

@@ -10,7 +10,7 @@ from app.core.decision.step import rounded
 from app.core.pairs import Comparison
 from app.core.warning import CodedWarning, of_stored
 from app.language.i18n import _, ngettext
-from app.language.numbers import mm, um, um_limit
+from app.language.numbers import mm, signed_mm, um, um_limit
 from app.language.times import in_sentence
 from app.loop.warnings.wording import sentence as coded
 
@@ -31,7 +31,8 @@ def sentence(record: CalibrationRecord) -> str:
         "limit": um_limit(record.settings.get("averaging_limit", 0.0)),
         "before": um(record.value_before),
         "proposed": um(record.proposed),
-        "offset": mm(record.proposed),
+        "apart": signed_mm(record.difference),  # beside an offset, which is read in mm
+        "offset": signed_mm(record.proposed),
     }
     match record.outcome:
         case Outcome.WITHIN_ZERO_RANGE:
@@ -57,7 +58,7 @@ def sentence(record: CalibrationRecord) -> str:
         case Outcome.CENTRED if record.proposed is None:
             text = _("The probe is in the middle of the spindle: its offset stays.")
         case Outcome.CENTRED:
-            text = _("The probe is {difference} off the spindle axis: its X offset becomes {offset}.")
+            text = _("The probe is {apart} off the spindle axis: its X offset becomes {offset}.")
         case Outcome.PAIRED:
             text = _(
                 "The machine reads {difference} more than the external gauge: the empirical value becomes {proposed}."
@@ -90,12 +91,12 @@ def values_of(record: CalibrationRecord) -> dict[str, Any]:
 
 def refusal(data: Mapping[str, Any]) -> str:
     """The reason for the refusal of a calibration."""
-    at, diameters = data.get("at"), data.get("diameters")
+    at, diameters, limit = data.get("at"), data.get("diameters"), data.get("limit") or 0.0
     values = {
         "at": at,
         "window": mm(data.get("window"), 3),
-        "left": um(data.get("deviation")),
-        "limit": um_limit(data.get("limit") or 0.0),
+        "left": signed_mm(data.get("deviation")) if limit >= 1 else um(data.get("deviation")),
+        "limit": um_limit(limit),
         "smallest": mm(data.get("smallest")),
         "largest": mm(data.get("largest")),
         "diameter": mm(diameters[at - 1] if at and diameters and at <= len(diameters) else None),

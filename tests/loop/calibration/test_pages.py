@@ -174,7 +174,7 @@ class TestWithoutScripts:
         }
         text = operator.send(probe(shop), **fields, **sections)
         assert "+12.0" in text
-        assert "its X offset becomes 0.0120" in text
+        assert "is +0.0120\N{NO-BREAK SPACE}mm off the spindle axis: its X offset becomes +0.0120" in text
         operator.send(f"{probe(shop)}/accept/1", reason="Calibrated as planned")
         assert shop.tool(32)["offset"] == 0.012
         text = operator.send(probe(shop), **fields, first_move_triggered="true")
