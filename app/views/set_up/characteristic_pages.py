@@ -25,6 +25,7 @@ from app.loop.characteristics.wording import history, result_label
 from app.loop.machines import queries as machines
 from app.loop.programs import queries as programs
 from app.loop.readings import queries as readings
+from app.loop.tables.readings import Stream
 from app.quality.gauge_studies import queries as gauge_studies
 from app.quality.gauge_studies import wording as gauge_wording
 from app.quality.what_if import queries as what_if
@@ -39,6 +40,8 @@ from app.web.paging import Order, address, part_of
 router = APIRouter(include_in_schema=False)
 ON_PAGE = 200
 SAME = 5e-7  # mm; a smaller difference of R33 is none
+ANY_SIZE = {"target": "1", "tolerance_width": "0.1"}
+FACTOR = "parameters.factor"
 LOOKED_BACK = 100  # readings from which a plausible jump is suggested
 
 
@@ -97,7 +100,7 @@ def send_new_characteristic(request: Request, session: SessionDep, caller: Engin
     except InbandError as error:
         if not error.errors:
             raise
-        return _new(request, session, caller, form, _all_errors(error, filled), error.status)
+        return _new(request, session, caller, form, _all_errors(error, named, filled), error.status)
     return RedirectResponse(f"/setup/characteristics/{stored.characteristic.key}?done=added", 303)
 
 
@@ -110,10 +113,11 @@ def _with_suggestions(session: Session, form: Mapping[str, str]) -> dict[str, st
     return parameter_form.with_suggestions(form, machine.zero_range_floor, used, machine.average_locations)
 
 
-def _all_errors(error: InbandError, form: Mapping[str, str]) -> dict[str, str]:
+def _all_errors(error: InbandError, named: Mapping[str, str], form: Mapping[str, str]) -> dict[str, str]:
     """Errors of the names and of the parameters together, each once.
 
-    Limits that are to be suggested once the tolerance is known are no errors; without a tool the rest is looked at as with one.
+    Limits that are to be suggested once the tolerance is known are no errors; without a tool, or a size, the rest is looked at
+    as with one.
     """
     unsaid = {name for name in SuggestedLimits._fields if not form.get(name, "").strip()}
     assumed = dict(form) | dict.fromkeys(unsaid, "1")
@@ -121,6 +125,14 @@ def _all_errors(error: InbandError, form: Mapping[str, str]) -> dict[str, str]:
         assumed["tool_memory"] = "1"
     errors = [each for each in error.errors if each.field.removeprefix("parameters.") not in unsaid]
     errors += actions.refusals(parameter_form.parameters_from(assumed))
+    try:
+        parsed(CharacteristicIn, dict(named) | {"parameters": {}})
+    except Invalid as of_names:
+        made = () if named["key"] else ("key",)  # from the name
+        errors += [each for each in of_names.errors if each.field not in made]
+    sized = assumed | dict.fromkeys((*parameter_form.DRAWING, *SuggestedLimits._fields), "") | ANY_SIZE
+    sized = parameter_form.with_suggestions(sized, 0.0, (), AVERAGE_LOCATIONS)
+    errors += [each for each in actions.refusals(parameter_form.parameters_from(sized)) if each.field == FACTOR]
     return by_field(Invalid(error.detail, errors=dict.fromkeys(errors)))
 
 
@@ -275,6 +287,7 @@ def _characteristic(
         status=status,
         characteristic=characteristic,
         machine=current.machine,
+        read=session.get_one(Stream, (characteristic.machine_id, characteristic.id)).sequence,
         version=current.version,
         in_force_measures_only=current.parameters.measures_only,
         problem=problem,

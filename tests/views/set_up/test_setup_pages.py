@@ -179,6 +179,26 @@ class TestCharacteristics:
         assert "It measures only" in engineer.open(f"/setup/characteristics/{key}")
         assert shop.call("GET", f"/characteristics/{key}")["parameters"]["average_memory"] == 0
 
+    def test_everything_that_is_missing_is_said_at_once(self, engineer: Person, shop: Shop) -> None:
+        nothing = dict.fromkeys(("name", "nominal", "upper_deviation", "lower_deviation", "tool_memory", "factor"), "")
+        said = errors(self.new(engineer, shop, "", 422, **nothing).text)
+        assert [sentence.split(":")[0].split(",")[0] for sentence in said] == [
+            "Is missing",
+            "The size is missing",
+            "Enter the tool whose offset is corrected",
+            "The factor is missing",
+        ]
+
+    def test_what_comes_next_is_said(self, engineer: Person, shop: Shop) -> None:
+        key = unique("bare")
+        shop.call("POST", "/machines", 201, key=key, name="Bare", control="other")
+        asks, first = "Add the first characteristic", "Measure a part and type its size"
+        assert asks in engineer.open(f"/setup/machines/{key}")
+        assert asks not in engineer.open(f"/setup/machines/{shop.machine}")
+        assert first in engineer.open(f"/setup/characteristics/{shop.characteristic}")
+        shop.read(1.0)
+        assert first not in engineer.open(f"/setup/characteristics/{shop.characteristic}")
+
     def test_limits_that_follow_from_the_tolerance_are_not_asked_for(self, engineer: Person, shop: Shop) -> None:
         left = dict.fromkeys(("zero_range", "wear_limit", "confidence_limit"), "")
         page = self.new(engineer, shop, unique("asked"), 422, **left, upper_deviation="", lower_deviation="").text
