@@ -28,11 +28,11 @@ class SizeAxis:
         words = _("Size, mm")
         values = list(dict.fromkeys(nanometres(value) for value in self.empirical_values))
         if len(values) > 1:
-            words = _("Size, mm, each corrected by its empirical value, {low} to {high}").format(
+            words = _("Size, mm (empirical value {low} to {high})").format(
                 low=um(min(values) / 1e6), high=um(max(values) / 1e6)
             )
         elif any(values):
-            words = _("Size, mm, corrected by the empirical value {value}").format(value=um(values[0] / 1e6))
+            words = _("Size, mm (empirical value {value})").format(value=um(values[0] / 1e6))
         if self.retargeted:
             words += "<br>" + _("the target changed in this view: each about its own")
         return words

@@ -113,7 +113,7 @@ def zone_chart(
     ]
     offsets = offset_lane(steps, events, span, total_before, half=half_of(limits), brief=brief)
     total = Axis(
-        "" if brief else _("Σ correction, µm"),
+        "" if brief else _("Σ, µm"),  # the lane is low; the key names it in full
         ticks=3,
         format="+.1f",
         zero="faint",

@@ -56,7 +56,7 @@ def test_every_chart_has_the_limits_of_the_drawing(shaft: Shop) -> None:
         zones = figure(shaft, "zones", scale=scale)
         assert {"<b>39.9840</b>", "<b>39.9920</b>", "<b>40.0000</b>"} <= set(zones["layout"]["yaxis"]["ticktext"])
         for found, meta in ((zones, "readings"), (over_time, "run")):
-            assert title(found) == "Size, mm, corrected by the empirical value +1.4\xa0µm"
+            assert title(found) == "Size, mm (empirical value +1.4\xa0µm)"
             (text,) = trace(found, meta)["text"]
             assert "size 39.9840\xa0mm" in text or "size 39.9839\xa0mm" in text
             assert re.search(r"machine reading 39\.985[34]\xa0mm, empirical value \+1\.4\xa0µm taken off", text)
@@ -67,10 +67,8 @@ def test_each_reading_by_its_own_empirical_value(shaft: Shop) -> None:
     set_empirical_value(shaft, 0.003)
     read(shaft, 39.995)
     for name in ("run", "zones"):
-        assert title(figure(shaft, name)) == (
-            "Size, mm, each corrected by its empirical value, +1.4\xa0µm to +3.0\xa0µm"
-        )
-        assert title(figure(shaft, name, last=1)).endswith("corrected by the empirical value +3.0\xa0µm")
+        assert title(figure(shaft, name)) == ("Size, mm (empirical value +1.4\xa0µm to +3.0\xa0µm)")
+        assert title(figure(shaft, name, last=1)).endswith("(empirical value +3.0\xa0µm)")
     assert trace(figure(shaft, "run"), "run")["y"] == [39.992, 39.992]
 
 
@@ -106,7 +104,7 @@ def test_of_a_long_history_the_blocks_tell_it_too(shaft: Shop) -> None:
     batch(1_001, 2_000, 39.994)
     found = figure(shaft, "zones", last="all")
     assert trace(found, "maximum")["x"]
-    assert title(found) == "Size, mm, each corrected by its empirical value, +1.4\xa0µm to +2.0\xa0µm"
+    assert title(found) == "Size, mm (empirical value +1.4\xa0µm to +2.0\xa0µm)"
 
 
 def test_pages_and_files_have_the_same_size(shaft: Shop, server: Any) -> None:
