@@ -218,6 +218,36 @@ def test_the_key_of_a_machine_hears_all_that_it_may_do(shop: Shop) -> None:
     assert "its corrections, tools, averages, calibrations and pairs" in refused.json()["detail"]
 
 
+VIEWERS_MAY = {
+    "previews",
+    "preview",
+    "what-if",
+    "sampling",
+    "map",
+    "read",
+    "reports",
+    "measuring-plans",
+    "me",
+    "count-charts",
+}
+
+
+def test_a_viewer_hears_that_before_what_is_wrong_on_every_route(server: InProcess) -> None:
+    viewer = server.client(server.key("viewer"))
+    routes = [
+        (method, route.path)
+        for router in ROUTERS
+        for route in router.routes
+        if isinstance(route, APIRoute) and route.path.startswith("/api/v1/")
+        for method in (route.methods or set()) & {"POST", "PUT", "PATCH"}
+        if not route.path.endswith(tuple(VIEWERS_MAY))
+    ]
+    assert len(routes) > 80
+    for method, path in routes:
+        answer = viewer.request(method, re.sub(r"{\w+}", "1", path), json={"nonsense": 1})
+        assert answer.status_code != 422, (method, path, answer.text)
+
+
 @pytest.mark.parametrize(
     ("method", "path"),
     [

@@ -4,7 +4,7 @@ from typing import Annotated
 
 from fastapi import Path, Response
 
-from app.access.deps import AnyCaller, Operator
+from app.access.deps import AnyCaller, Operator, OperatorOrMachine
 from app.geometry.alignment import actions, queries
 from app.geometry.alignment.answers import AlignmentOut, alignment_out
 from app.geometry.alignment.schemas import AlignmentIn, AlignmentRecomputeIn, PalletIn
@@ -20,14 +20,13 @@ Number = Annotated[int, Path(description="Number of the alignment.", examples=[7
 
 
 @router.post("/alignments", status_code=201, responses=problems(404, 409) | sent_again(AlignmentOut))
-def align(session: SessionDep, caller: AnyCaller, body: AlignmentIn, response: Response) -> AlignmentOut:
+def align(session: SessionDep, caller: OperatorOrMachine, body: AlignmentIn, response: Response) -> AlignmentOut:
     """Find where a part lies: from six touches (3-2-1) or more, two points on a side, or two holes.
 
     The answer is the frame, how well it is known, which touches do not fit, and the text for the machine's control. Touches
     that leave the part free to move are refused with the reason, and with the touch to move. `warnings` names what is hardly
     plausible: until somebody acknowledges them the text stops the control.
     """
-    caller.must_somewhere("operator")
     with readings.pushing(session) as own:
         machine = machine_for(own, caller, body.machine, "operator")
         created = actions.align(own, machine, body, caller)
@@ -36,9 +35,8 @@ def align(session: SessionDep, caller: AnyCaller, body: AlignmentIn, response: R
 
 
 @router.post("/alignments/pallets", status_code=201, responses=problems(404, 409) | sent_again(AlignmentOut))
-def compose_pallet(session: SessionDep, caller: AnyCaller, body: PalletIn, response: Response) -> AlignmentOut:
+def compose_pallet(session: SessionDep, caller: OperatorOrMachine, body: PalletIn, response: Response) -> AlignmentOut:
     """Compose the error of a pallet with that of a part on it: where the part lies on the machine."""
-    caller.must_somewhere("operator")
     created = actions.compose(session, body, caller)
     response.status_code = 200 if created.again else 201
     return alignment_out(session, created.row)

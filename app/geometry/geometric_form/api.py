@@ -4,7 +4,7 @@ from typing import Annotated, Literal
 
 from fastapi import Path, Query, Response
 
-from app.access.deps import AnyCaller, Caller
+from app.access.deps import AnyCaller, Caller, OperatorOrMachine
 from app.errors import NotFound
 from app.geometry.geometric_form import actions, figures, queries, wording
 from app.geometry.geometric_form.answers import FormOut, form_out
@@ -44,7 +44,7 @@ KindName = Literal[
 
 
 @router.post("/forms", status_code=201, responses=problems(404, 409) | sent_again(FormOut))
-def measure_form(session: SessionDep, caller: AnyCaller, body: FormIn, response: Response) -> FormOut:
+def measure_form(session: SessionDep, caller: OperatorOrMachine, body: FormIn, response: Response) -> FormOut:
     """Evaluate form or position of a feature from its touches.
 
     Answers the deviation by every method that applies, the verdict, the uncertainty from the probe's repeatability, and
@@ -88,9 +88,8 @@ def get_form_measurement(session: SessionDep, caller: AnyCaller, number: Number)
 
 
 @router.post("/forms/{number}/recompute", status_code=201, responses=problems(404))
-def recompute_form(session: SessionDep, caller: AnyCaller, number: Number, body: ReasonIn) -> FormOut:
+def recompute_form(session: SessionDep, caller: OperatorOrMachine, number: Number, body: ReasonIn) -> FormOut:
     """Evaluate the stored touches again by the present code; what was found before stays on record."""
-    caller.must_somewhere("operator")
     row = queries.form(session, number)
     caller.must_at(row.measurement.machine_id, "operator")
     return _answer(session, actions.recompute(session, number, body.reason, caller))

@@ -5,7 +5,7 @@ from typing import Annotated, Literal
 from fastapi import Path, Query, Response
 from pydantic import StringConstraints
 
-from app.access.deps import AnyCaller, Caller, Engineer, Operator
+from app.access.deps import AnyCaller, Caller, Engineer, Operator, OperatorOrMachine
 from app.errors import Invalid
 from app.geometry.rotary_axes import actions, figures, queries, run_history
 from app.geometry.rotary_axes.answers import RecomputedOut, RunOut, axis_out, run_out
@@ -53,7 +53,7 @@ HeadName = Annotated[str, StringConstraints(strip_whitespace=True, max_length=64
 
 
 @router.post("/kinematics/runs", status_code=201, responses=problems(404, 409) | sent_again(RunOut))
-def take_kinematics_run(session: SessionDep, caller: AnyCaller, body: RunIn, response: Response) -> RunOut:
+def take_kinematics_run(session: SessionDep, caller: OperatorOrMachine, body: RunIn, response: Response) -> RunOut:
     """Take a run of cycle 452: ball touches or centres (`axes`, `shift`), result parameters, or the control's protocol.
 
     A ball further off than maxDevCalBall makes a refused run: that is kept, and counts for nothing. A change larger than
@@ -131,9 +131,8 @@ def undo_kinematics_run(session: SessionDep, caller: Engineer, run: RunNumber, b
 
 
 @router.post("/kinematics/runs/{run}/recompute", responses=problems(404))
-def recompute_kinematics_run(session: SessionDep, caller: AnyCaller, run: RunNumber) -> RecomputedOut:
+def recompute_kinematics_run(session: SessionDep, caller: OperatorOrMachine, run: RunNumber) -> RecomputedOut:
     """Evaluate it again from what was sent, and say whether that comes to what is on record; nothing is changed."""
-    caller.must_somewhere("operator")
     _run(session, caller, run)
     row, evaluated = actions.recompute(session, run)
     return RecomputedOut(

@@ -5,7 +5,7 @@ from typing import Annotated
 from fastapi import Path, Query, Response
 from fastapi.responses import PlainTextResponse
 
-from app.access.deps import AnyCaller, Engineer, Operator
+from app.access.deps import AnyCaller, Engineer, Operator, OperatorOrMachine
 from app.geometry.work_zero import actions, figures, queries
 from app.geometry.work_zero.answers import (
     TEXT,
@@ -50,14 +50,13 @@ FixtureFilter = Annotated[Slug | None, Query(description="Only of this fixture."
 
 
 @router.post("/work-zeros", status_code=201, responses=problems(404, 409) | sent_again(ZeroOut))
-def find_work_zero(session: SessionDep, caller: AnyCaller, body: ZeroIn, response: Response) -> ZeroOut:
+def find_work_zero(session: SessionDep, caller: OperatorOrMachine, body: ZeroIn, response: Response) -> ZeroOut:
     """Find work zero and size from the touches of an edge finder or probe.
 
     The answer holds the text that sets it on the machine's control, and how far the fixture has shifted. Touches that make
     no zero are refused with the reason, by their numbers. `characteristics` names what its results become readings of.
     `warnings` names what is hardly plausible: until somebody acknowledges them the text stops the control.
     """
-    caller.must_somewhere("operator")
     with readings.pushing(session) as own:
         machine = machine_for(own, caller, body.machine, "operator")
         created = actions.find(own, machine, body, caller)

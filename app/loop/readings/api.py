@@ -90,6 +90,7 @@ async def push_reading(request: Request, caller: AnyCaller) -> Response:
     `touches` may be in place of `measured`: one list per point, each with its repeats. `correction_in_effect` is the
     number of the last correction that the machine had applied when it cut this part; `machined_at` may say it by time.
     """
+    caller.must_somewhere("operator")
     reading = await decoded(await request.body())
     status, value = await store_reading(caller, reading, *_here(request))
     return Response(msgspec.json.encode(value), status, media_type="application/json")
@@ -117,6 +118,7 @@ async def push_batch(
     decisions: Annotated[bool, Query(description="Answer with every decision, not only with counts.")] = False,
 ) -> Response:
     """Push up to 10,000 readings as a JSON list or NDJSON: decided in the given order, all or nothing."""
+    caller.must_somewhere("operator")
     directory, writer, database = _here(request)
     body = await request.body()
     lines = request.headers.get("content-type", "").partition(";")[0].strip().lower() == NDJSON

@@ -115,6 +115,7 @@ class ReadingsDoor:
             )
         scope["caller"] = caller
         body = await _body(receive)
+        caller.must_somewhere("operator")
         reading = await decoded(body)
         status, value = await store_reading(caller, reading, self.directory, self.writer, self.database)
         return status, _json.encode(value), {}

@@ -4,7 +4,7 @@ from typing import Annotated, Literal
 
 from fastapi import Path, Query, Response
 
-from app.access.deps import AnyCaller, Engineer
+from app.access.deps import AnyCaller, Engineer, OperatorOrMachine
 from app.errors import Invalid
 from app.language.i18n import _
 from app.loop.characteristics.queries import characteristic_for, characteristic_named
@@ -24,7 +24,7 @@ Revision = Annotated[int | None, Query(ge=1, description="Of this revision; of t
 
 
 @router.post("/gauge-studies", status_code=201, responses=problems(404, 409) | sent_again(StudyOut))
-def add_gauge_study(session: SessionDep, caller: AnyCaller, given: StudyIn, response: Response) -> StudyOut:
+def add_gauge_study(session: SessionDep, caller: OperatorOrMachine, given: StudyIn, response: Response) -> StudyOut:
     """Keep a gauge study with all its values, and answer what it says."""
     if given.machine is not None:
         machine = machine_for(session, caller, given.machine, "operator")
@@ -38,7 +38,9 @@ def add_gauge_study(session: SessionDep, caller: AnyCaller, given: StudyIn, resp
 
 
 @router.post("/gauge-studies/from-readings", status_code=201, responses=problems(404, 409) | sent_again(StudyOut))
-def take_gauge_study(session: SessionDep, caller: AnyCaller, given: FromReadingsIn, response: Response) -> StudyOut:
+def take_gauge_study(
+    session: SessionDep, caller: OperatorOrMachine, given: FromReadingsIn, response: Response
+) -> StudyOut:
     """Make a gauge study of stored readings: one part probed again and again, or the repeats of each touch.
 
     Excluded readings are left out. The values are copied: what becomes of the readings later does not change the study.
