@@ -194,13 +194,17 @@ def unit_shown(code: str) -> str:
 
     >>> unit_shown('0.000"mm"'), unit_shown('0.0\\\\"'), unit_shown("0.00%"), unit_shown('0.0"°"'), unit_shown('"Ø"0.000" ok"')
     ('mm', '"', '%', '°', '')
+    >>> unit_shown('0.0" 1/1000"'), unit_shown('0.0" furlong"')
+    ('1/1000', 'furlong')
     """
     code = code.partition(";")[0]
-    behind = code[max(code.rfind(sign) for sign in "0#?") + 1 :]
+    bare = _LITERAL.sub(lambda literal: " " * len(literal[0]), code)
+    behind = code[max(bare.rfind(sign) for sign in "0#?") + 1 :]
     word = "".join(quoted or escaped for quoted, escaped in _LITERAL.findall(behind)).strip()
     if "%" in _LITERAL.sub("", behind):
         return "%"
-    return word if length_unit(word) or like_a_unit(word) else ""
+    scaled = "10" in word and any(sign in "/x×*^" for sign in word)
+    return word if scaled or length_unit(word) or like_a_unit(word) else ""
 
 
 def refuse_error(text: str) -> None:
