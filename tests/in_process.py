@@ -3,6 +3,7 @@
 import asyncio
 from collections.abc import AsyncIterator, Iterator
 from contextlib import asynccontextmanager, contextmanager, suppress
+from functools import cache
 from typing import Any
 
 import httpx
@@ -67,6 +68,14 @@ class Direct(httpx.BaseTransport):
             return httpx.Response(500)
         content = httpx.ByteStream(b"".join(part.get("body", b"") for part in said[1:]))
         return httpx.Response(said[0]["status"], headers=said[0]["headers"], stream=content)
+
+
+@cache
+def application() -> FastAPI:
+    """One that no database stands behind, for what it says of itself: its OpenAPI document takes some seconds, once."""
+    from app.main import create_plant
+
+    return create_plant(Settings(database_url="postgresql://nobody@localhost/nothing")).app
 
 
 class InProcess(Server):

@@ -19,7 +19,7 @@ import pytest
 from app.web.openapi import example_of
 from tests.conftest import NewDatabase, Server, drop_database
 from tests.geometry.rotary_axes.bench import axis
-from tests.in_process import in_process
+from tests.in_process import application, in_process
 from tests.loop.readings.record import counted
 from tests.quality.control_charts.line import Line
 from tests.shop import PARAMETERS, Shop
@@ -478,13 +478,8 @@ class Operation(NamedTuple):
     declared: dict[str, Any]
 
 
-@cache
 def document() -> dict[str, Any]:
-    from app.main import create_plant
-    from app.settings import Settings
-
-    app = create_plant(Settings(database_url="postgresql://nobody@localhost/nothing")).app
-    made: dict[str, Any] = app.openapi()
+    made: dict[str, Any] = application().openapi()
     return made
 
 

@@ -20,6 +20,7 @@ from app.loop.readings.schemas import ReadingIn
 from app.web.api_docs import _kind, curl, prose
 from app.web.openapi import EXAMPLES, example_of, operations, resolve
 from tests.conftest import Server
+from tests.in_process import application
 
 pytestmark = pytest.mark.own_server  # the examples name machines and characteristics
 
@@ -30,10 +31,7 @@ SHARES = 4  # of all operations, where each is called many times
 
 @pytest.fixture(scope="module")
 def app() -> FastAPI:
-    from app.main import create_plant
-    from app.settings import Settings
-
-    return create_plant(Settings(database_url="postgresql://nobody@localhost/none")).app
+    return application()
 
 
 @pytest.fixture(scope="module")
