@@ -106,7 +106,7 @@ _OTHERS: Final = frozenset(
 _OTHER_SYSTEMS: Final = _OTHERS - OTHER_UNITS - {"my", "col", "counts"}
 _OTHER_AT_END: Final = re.compile(
     rf"(?:[-_,;/ .:=|]|(?<=\d))({'|'.join(map(re.escape, sorted(_OTHERS)))})$|(?<=\S[ .-])(in\.?|ins)$|^(um|mils?|in(?=_[a-z]?\d))_"
-    r"|(?<![^\W\d_])(angle|winkel|ugao|угол|угао)[ _]?\d*$",
+    r"|(?<![^\W\d_])(angle|[^\W\d_]*winkel|ugao|угол|угао)[ _]?\d*$",
     re.IGNORECASE,
 )
 """Those, *in* where it may be inches as well as a word (*Bore in*), and names of angles."""

@@ -77,7 +77,16 @@ def test_the_unit_of_a_header(header: str, unit: str | None) -> None:
         "10ths",
         "Écart en centièmes",
     ]
-    + ["Area [mm²]", "Area mm^2", "Feed mm/min", "CONE1(Inside) Angle", "Winkel_2", "Size (mm or in)", "Size mm/inch"],
+    + [
+        "Area [mm²]",
+        "Area mm^2",
+        "Feed mm/min",
+        "CONE1(Inside) Angle",
+        "Winkel_2",
+        "Kegelwinkel 1",
+        "Size (mm or in)",
+        "Size mm/inch",
+    ],
 )
 def test_a_unit_that_is_no_length_is_never_taken_for_mm(header: str) -> None:
     with pytest.raises(UnknownUnit):
