@@ -91,6 +91,8 @@ async def ask(unit: Unit, client: AsyncClient) -> None:
     pending: dict[int, list[Correction]] = {}  # the location that waits longest first
     for correction in await client.pending(machine.key):
         pending.setdefault(correction.tool_memory, []).append(correction)
+        if correction.tool_memory in unit.newest:
+            unit.newest[correction.tool_memory] = max(unit.newest[correction.tool_memory], correction.number)
         if unit.tool_memories.get(str(correction.characteristic)) != correction.tool_memory:
             unit.locations_at = (
                 -math.inf

@@ -4,6 +4,7 @@ import asyncio
 import contextlib
 import json
 import logging
+import math
 import time
 from collections.abc import Awaitable, Callable, Sequence
 from datetime import UTC, datetime
@@ -119,6 +120,7 @@ async def _push_all(unit: Unit, client: AsyncClient, rows: Sequence[Waiting]) ->
         else:
             await _decided(unit, list(zip(rows, batch.decisions, strict=True)))
             await unit.store.sent(unit.machine.key, [row.id for row in rows])
+            _newest(unit, batch.decisions)
             for row, decided in zip(rows, batch.decisions, strict=False):
                 log_lines.decision(unit.machine.key, row.key, decided)
             return batch.decisions
@@ -141,6 +143,7 @@ async def _push(unit: Unit, client: AsyncClient, row: Waiting) -> Decision | Non
     else:
         await _decided(unit, [(row, decision)])
         await unit.store.sent(unit.machine.key, [row.id])
+        _newest(unit, [decision])
         log_lines.decision(unit.machine.key, row.key, decision)
         return decision
     await unit.store.refuse(unit.machine.key, row.id, reason)
@@ -166,19 +169,42 @@ async def _decided(unit: Unit, pairs: Sequence[tuple[Waiting, Decision]]) -> Non
 async def _as_sent(unit: Unit, client: AsyncClient, row: Waiting) -> dict[str, Any]:
     """A reading as the server takes it: with the correction in effect of its own tool location.
 
-    A control keeps one number for all locations, which do not get their corrections in the order of the numbers.
+    A control keeps one number for all locations, which do not get their corrections in the order of the numbers. Of what a
+    person has set by hand it knows nothing: then its number is no answer.
     """
     body = row.body | {"key": row.key}
     number = body.get("correction_in_effect")
-    if not number:
+    if number is None:
         return body
     memory = await _tool_memory(unit, client, str(body.get("characteristic")))
-    known = await unit.store.in_effect(unit.machine.key, memory, int(number)) if memory else None
-    if known is None:
+    known = number and (await unit.store.in_effect(unit.machine.key, memory, int(number)) if memory else None)
+    if known is None or (memory and await _set_by_hand(unit, client, memory, known, row.at)):
         del body["correction_in_effect"]
     else:
         body["correction_in_effect"] = known
     return body
+
+
+async def _set_by_hand(unit: Unit, client: AsyncClient, memory: int, known: int, at: float) -> bool:
+    """Tell if a correction beyond the known one was in the offset when a reading came, and not by this control."""
+    if unit.machine.corrections == "none" or known >= unit.newest.get(memory, math.inf):
+        return False  # without a mailbox the number is that of a text, or typed
+    query: dict[str, Any] = {"status": "applied", "tool_memory": memory, "after": known}
+    applied = [each async for each in client.items(f"/machines/{unit.machine.key}/corrections", **query)]
+    unit.newest.setdefault(memory, max((each["number"] for each in applied), default=known))
+    if not applied:
+        return False
+    own = await unit.store.applied(unit.machine.key, memory)
+    return any(
+        each["number"] not in own and datetime.fromisoformat(each["applied_at"]).timestamp() < at for each in applied
+    )
+
+
+def _newest(unit: Unit, decisions: Sequence[Decision]) -> None:
+    """Note the newest correction of each location."""
+    for decision in decisions:
+        if (issued := decision.correction) is not None and issued.tool_memory in unit.newest:
+            unit.newest[issued.tool_memory] = max(unit.newest[issued.tool_memory], issued.number)
 
 
 async def _tool_memory(unit: Unit, client: AsyncClient, characteristic: str) -> int | None:

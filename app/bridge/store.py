@@ -339,6 +339,12 @@ class Store:
         """
         return await self._run(lambda database: in_effect(database, machine, tool_memory, number))
 
+    async def applied(self, machine: str, tool_memory: int) -> set[int]:
+        """The corrections of a location that the control itself has applied."""
+        text = "SELECT number, merged FROM intent WHERE machine = ? AND tool_memory = ? AND applied = 1"
+        rows = await self._run(lambda database: database.execute(text, (machine, tool_memory)).fetchall())
+        return {int(each) for number, merged in rows for each in (number, *json.loads(merged or "[]"))}
+
     # --- decisions
 
     async def keep_decisions(self, machine: str, decided: Sequence[Decided]) -> None:

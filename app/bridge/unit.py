@@ -68,8 +68,8 @@ class Unit:
     control side offers them until they are too old. taken: tool memories that the control has answered an order for since the
     server was asked last. decisions: what the control has to hear of. news: something waits for the server; to_tell: an answer of the control is among it. state and
     detail: the control's side, as the heartbeat tells it. held_back: why corrections wait. tool_memories: by characteristic, as
-    the server said at locations_at (of the monotonic clock). trouble: the server's side, None while it answers. context: what an
-    MTConnect agent tells of the machine. test: the touch test that is open; no correction is offered meanwhile; test_open: there
+    the server said at locations_at (of the monotonic clock). newest: number of the newest correction of a location, once asked.
+    trouble: the server's side, None while it answers. context: what an MTConnect agent tells of the machine. test: the touch test that is open; no correction is offered meanwhile; test_open: there
     is one. beat_now: the heartbeat waits no longer.
     refused: keys of readings that the server has refused, and the reasons: the machine has not heard of it yet.
     """
@@ -90,6 +90,7 @@ class Unit:
     held_back: tuple[HeldBack, ...] = ()
     tool_memories: dict[str, int | None] = field(default_factory=dict)
     locations_at: float = -math.inf
+    newest: dict[int, int] = field(default_factory=dict)
     trouble: str | None = None
     started_at: datetime = field(default_factory=lambda: datetime.now(UTC))
     polls: int = 0

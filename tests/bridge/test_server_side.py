@@ -54,6 +54,7 @@ class Scripted:
         self.waiting = list(pending)
         self.own = True
         self.characteristics: dict[str, int] = {}
+        self.applied: dict[int, float] = {}
         self.pushed: list[dict[str, Any]] = []
         self.heard: list[tuple[Any, ...]] = []
         self.refuses: Callable[[dict[str, Any]], Exception | None] = lambda _reading: None
@@ -76,7 +77,12 @@ class Scripted:
         if not self.own:
             raise Forbidden(f"GET {path}", "another machine's key", status=403)
 
-    async def items(self, path: str, **_query: Any) -> AsyncIterator[dict[str, Any]]:
+    async def items(self, path: str, **query: Any) -> AsyncIterator[dict[str, Any]]:
+        if path.endswith("/corrections"):
+            for number, at in self.applied.items():
+                if number > query["after"]:
+                    yield {"number": number, "applied_at": datetime.fromtimestamp(at, UTC).isoformat()}
+            return
         for key, memory in self.characteristics.items():
             yield {"key": key, "parameters": {"tool_memory": memory}}
 
@@ -367,6 +373,36 @@ def test_a_reading_names_the_correction_in_effect_of_its_own_location(tmp_path: 
 
     story(tmp_path, server, before)
     assert [reading.get("correction_in_effect") for reading in server.pushed] == [7, 3, None, 5, 7, 9, None]
+
+
+@pytest.mark.parametrize(
+    ("hand", "number", "sent"),
+    [
+        ({9: 0.0}, 0, None),  # set at the control by hand, marked applied: the control goes on reporting 0
+        ({9: 0.0}, 7, None),
+        ({9: 4e9}, 7, 7),  # the reading came before that
+        ({7: 0.0}, 0, 0),  # its own: the part was cut before
+        ({3: 0.0}, 0, 0),  # taken along by its own
+        ({5: 0.0}, 7, 7),
+        ({}, 0, 0),
+    ],
+)
+@pytest.mark.parametrize("corrections", ["control", "none"])
+def test_of_what_a_person_has_set_by_hand_the_number_of_the_control_says_nothing(
+    tmp_path: Path, hand: dict[int, float], number: int, sent: int | None, corrections: str
+) -> None:
+    """Else a part that was cut with it is taken for one without, and what it corrected is taken back."""
+    server = Scripted()
+    server.characteristics, server.applied = {"shaft-1": 3}, hand
+
+    async def before(store: Store) -> None:
+        await store.intend(M, Order(7, 3, 0.0, 0.01, (2, 3)), "hash")
+        await store.answered(M, Outcome(7, applied=True, offset=0.01))
+        body = {"characteristic": "shaft-1", "measured": 1.0, "correction_in_effect": number}
+        await store.add(M, [Received("k", body)])
+
+    story(tmp_path, server, before, {"corrections": corrections})
+    assert server.pushed[0].get("correction_in_effect") == (number if corrections == "none" else sent)
 
 
 @pytest.mark.parametrize(("tool", "asks"), [(3, False), (4, True)])
