@@ -3,11 +3,13 @@
 What a period means is in `app.core.period`, how it is written in `app.files.formats.periods`.
 """
 
+from contextlib import suppress
 from functools import partial
-from typing import Annotated, Any, NamedTuple
+from typing import Annotated, Any, NamedTuple, Self
+from zoneinfo import ZoneInfo
 
 from fastapi import Depends, Query, Request
-from pydantic import BeforeValidator, WithJsonSchema
+from pydantic import BeforeValidator, Field, ModelWrapValidatorHandler, WithJsonSchema, model_validator
 from pydantic_core import PydanticCustomError
 
 from app.core.context import Chosen as ChosenContext
@@ -17,7 +19,7 @@ from app.errors import FieldError, Invalid
 from app.files.formats import cell_values, periods
 from app.language.i18n import _
 from app.language.times import plant_zone
-from app.web.fields import LARGEST_ID, Moment
+from app.web.fields import LARGEST_ID, Body, Moment
 
 
 class Choice(NamedTuple):
@@ -68,6 +70,37 @@ Ending = Annotated[Moment, BeforeValidator(partial(_day, end=True)), _WRITTEN]
 """Where a period ends: before a moment with its offset, or with a day of the plant, itself included."""
 BEGINNING = "From this moment on, with its offset; a day such as 2026-03-05 begins at midnight by the plant's clock."
 ENDING = "Before this moment, which does not belong to the period itself; a day such as 2026-03-05 does, all of it."
+
+
+class PeriodBody(Body):
+    """A period in a body. Raises `Invalid` for one that runs backwards."""
+
+    start: Beginning | None = Field(default=None, alias="from", description=BEGINNING)
+    end: Ending | None = Field(default=None, alias="to", description=ENDING)
+
+    @classmethod
+    def zone(cls, _body: dict[str, Any]) -> ZoneInfo:
+        """The time zone of the days of a body: the plant's."""
+        return plant_zone()
+
+    @model_validator(mode="wrap")
+    @classmethod
+    def _in_order(cls, body: Any, made_of: ModelWrapValidatorHandler[Self]) -> Self:
+        if not isinstance(body, dict):
+            return made_of(body)
+        said = {name: body[name] for name in periods.NAMES if isinstance(body.get(name), str)}
+        days = {name: day for name, text in said.items() if (day := cell_values.day(text)) is not None}
+        with suppress(cell_values.Unreadable):  # beyond the calendar, which its field says
+            body |= {name: periods.begin_of(day, cls.zone(body), int(name == "to")) for name, day in days.items()}
+        made = made_of(body)
+        if made.start is not None and made.start == made.end and "to" in days:
+            raise periods.backwards(said["from"], said["to"])  # the day after that day
+        periods.in_order(made.period)
+        return made
+
+    @property
+    def period(self) -> Period:
+        return Period(self.start, self.end)
 
 
 def period_in_query(

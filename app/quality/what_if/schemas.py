@@ -6,33 +6,24 @@ from typing import Annotated, Any, Literal
 from pydantic import BaseModel, Field
 
 from app.core.context import ContextField
-from app.core.period import Period
 from app.core.policy_map import Criterion
 from app.core.replay import LONGEST_DELAY
 from app.core.sampling import CHOICES
-from app.files.formats import periods
 from app.quality.what_if.evidence import cell_of, evidence_of, period_of, sampling_of
 from app.quality.what_if.proposals import ProposalRow
 from app.quality.what_if.queries import USUAL, Map, Sampling, Simulation
 from app.quality.what_if.strata import ReplayedStratum
-from app.web.choice import BEGINNING, ENDING, Beginning, Ending
+from app.web.choice import PeriodBody
 from app.web.fields import LARGEST_ID, Body, Reason, answer_from
 
 LARGEST_LENGTH = 100_000.0
 Length = Annotated[float, Field(ge=0, le=LARGEST_LENGTH, strict=True)]
 
 
-class ReplayPeriodIn(Body):
+class ReplayPeriodIn(PeriodBody):
     """Readings to replay: of the last N those measured from … to; the last 1000 unless chosen otherwise."""
 
     last: Annotated[int | None, Field(ge=1, le=LARGEST_ID, strict=True, description="The last N readings.")] = None
-    start: Annotated[Beginning | None, Field(alias="from", description=BEGINNING)] = None
-    end: Annotated[Ending | None, Field(alias="to", description=ENDING)] = None
-
-    @property
-    def period(self) -> Period:
-        """The period to replay. Raises `Invalid` for one that runs backwards."""
-        return periods.in_order(Period(self.start, self.end))
 
     @property
     def newest(self) -> int | None:

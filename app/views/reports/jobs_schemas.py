@@ -2,25 +2,24 @@
 
 from datetime import datetime
 from typing import Annotated, Any, Literal
+from zoneinfo import ZoneInfo
 
-from pydantic import Field, model_validator
+from pydantic import Field
 
-from app.core.period import Period
 from app.files.documents.content import Paper
-from app.files.formats import cell_values, periods
 from app.language.i18n import current_language
 from app.language.times import plant_zone
 from app.views.reports.actions import KEPT_DAYS, MOST_AT_ONCE
 from app.views.reports.bundle import Bundle, BundleFormat
 from app.views.reports.request import ReportRequest, SectionName, section_names, zone_or_plants
 from app.views.reports.tables import ReportJob
-from app.web.choice import BEGINNING, ENDING, Beginning, Ending
+from app.web.choice import PeriodBody
 from app.web.fields import LARGEST_ID, Body, Slug
 
 Keys = Annotated[list[Slug], Field(max_length=MOST_AT_ONCE)]
 
 
-class ReportsIn(Body):
+class ReportsIn(PeriodBody):
     """Request for reports: the characteristics (by name, or all of these machines), the period and the format.
 
     `format`: a ZIP of files, or one `workbook` with a sheet for each characteristic.
@@ -28,8 +27,6 @@ class ReportsIn(Body):
 
     characteristics: Keys = Field(default=[], description="Keys of characteristics.")
     machines: Keys = Field(default=[], description="Keys of machines: all of their characteristics.")
-    start: Beginning | None = Field(default=None, alias="from", description=BEGINNING)
-    end: Ending | None = Field(default=None, alias="to", description=ENDING)
     last: int | None = Field(
         default=None,
         strict=True,
@@ -49,22 +46,16 @@ class ReportsIn(Body):
         default=None, max_length=64, description="In which moments are written; the plant's if left out."
     )
 
-    @model_validator(mode="before")
     @classmethod
-    def _days_of_its_zone(cls, body: Any) -> Any:
-        """A day is one of the time zone that is named."""
-        if not isinstance(body, dict) or not isinstance(body.get("timezone"), str):
-            return body
-        zone, days = zone_or_plants(body["timezone"]), {}
-        for name in periods.NAMES:
-            if isinstance(text := body.get(name), str) and (day := cell_values.day(text)) is not None:
-                days[name] = periods.begin_of(day, zone, 1 if name == "to" else 0)
-        return body | days
+    def zone(cls, body: dict[str, Any]) -> ZoneInfo:
+        """The time zone that is named, else the plant's."""
+        name = body.get("timezone")
+        return zone_or_plants(name if isinstance(name, str) else None)
 
     def bundle(self) -> Bundle:
         """Return the reports to make. Raises `Invalid`."""
         request = ReportRequest(
-            Period(self.start, self.end),
+            self.period,
             self.last,
             section_names(self.sections),
             self.paper,

@@ -177,6 +177,8 @@ def test_a_period_without_readings_is_refused(ran: Shop) -> None:
     assert "0 readings" in ask(ran, status=422, **old)["detail"]
     turned: dict[str, Any] = {"from": "2020-02-01T00:00:00Z", "to": "2020-01-01T00:00:00Z"}
     assert [each["field"] for each in ask(ran, status=422, **turned)["errors"]] == ["from"]
+    days = ask(ran, status=422, **{"from": "2026-11-27", "to": "2026-11-26"})
+    assert "2026-11-27 is later than `to` 2026-11-26; exchange the two" in days["detail"]
 
 
 def test_equal_readings_tell_nothing_and_say_so(shop: Shop) -> None:

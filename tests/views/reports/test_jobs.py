@@ -229,6 +229,13 @@ def test_only_who_asked_or_an_engineer_may_cancel(bores: Shop) -> None:
             "from",
             "later than",
         ),
+        ({"characteristics": ["bore-0"], "from": "2026-11-22", "to": "2026-11-21"}, "from", "2026-11-22 is later than"),
+        (
+            {"characteristics": ["bore-0"], "from": "2026-11-22", "to": "2026-11-21", "timezone": "Asia/Tokyo"},
+            "from",
+            "exchange the two",
+        ),
+        ({"characteristics": ["bore-0"], "to": "9999-12-31"}, "to", "9999"),
         ({"characteristics": ["bore-0"], "timezone": "Europe/Atlantis"}, "timezone", "Atlantis"),
         ({"characteristics": ["bore-0"], "last": 0}, "last", "1"),
         ({"characteristics": ["bore-0"], "sections": ["poetry"]}, "sections.0", "numbers"),
