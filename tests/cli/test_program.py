@@ -56,8 +56,8 @@ def test_programs_for_the_bridge_are_written_at_once_or_each_into_its_file(
 ) -> None:
     database = ("--database-url", server.database.dsn)
     ring = ("program", "write", shop.characteristic, "--ring", "--control", "fanuc", "--number", 7, *database)
-    text = inband(*ring, "--first-register", 600, "--time-out", 5).stdout
-    assert text.count("=600 (FIRST OF 98 REGISTERS)") == 4
+    text = inband(*ring, "--first-register", 604, "--time-out", 5).stdout
+    assert text.count("=604 (FIRST OF 98 REGISTERS)") == 4
     assert text.startswith("%")
     assert text.endswith("%\n")
     inband(*ring, "--folder", tmp_path / "ring")

@@ -313,7 +313,7 @@ _SYSTEM: Final = re.compile(
     r"\b(imperial|english|customary)\s+(?:units?|system|measure)|\bu\.?s\.?\s+(customary)\b", re.IGNORECASE
 )
 _UNIT_OF: Final = re.compile(
-    rf"\b(?:in|u|v|в|у|en|units?|einheit(?:en)?|jedinica)\s*[:=]?\s*(?:0?[.,]0*1\s*{_LENGTH}(?!\w)|10\s*(?:\^|⁻))"
+    rf"\b(?:in|u|v|в|у|en|units?|einheit(?:en)?|jedinica)(?:\s*[:=])?\s*(?:0?[.,]0*1\s*{_LENGTH}(?!\w)|10\s*(?:\^|⁻))"
     r"|\b(?:values?|sizes?|ma(?:ß|ss)e|werte|all)\b[^;|\d]{0,20}[x×*]\s?10{2,}\b",
     re.IGNORECASE,
 )

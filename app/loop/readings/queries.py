@@ -64,6 +64,11 @@ def entry_by_id(session: Session, machine_id: int, characteristic_id: int) -> En
     return Entry(*row)
 
 
+def count_of(session: Session, characteristic: Characteristic) -> int:
+    """Number of its readings."""
+    return session.get_one(Stream, (characteristic.machine_id, characteristic.id)).sequence
+
+
 def entries_for_results(
     session: Session, machine_id: int, named: Mapping[str, str], field: str = "characteristics.{result}"
 ) -> dict[str, Entry]:

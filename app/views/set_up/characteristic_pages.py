@@ -25,7 +25,6 @@ from app.loop.characteristics.wording import history, result_label
 from app.loop.machines import queries as machines
 from app.loop.programs import queries as programs
 from app.loop.readings import queries as readings
-from app.loop.tables.readings import Stream
 from app.quality.gauge_studies import queries as gauge_studies
 from app.quality.gauge_studies import wording as gauge_wording
 from app.quality.what_if import queries as what_if
@@ -287,7 +286,7 @@ def _characteristic(
         status=status,
         characteristic=characteristic,
         machine=current.machine,
-        read=session.get_one(Stream, (characteristic.machine_id, characteristic.id)).sequence,
+        read=readings.count_of(session, characteristic),
         version=current.version,
         in_force_measures_only=current.parameters.measures_only,
         problem=problem,

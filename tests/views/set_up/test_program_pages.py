@@ -145,7 +145,7 @@ class TestWriting:
         refused = engineer.open(f"{address}&number=0.5")
         assert "Must be a number from 1 to 9999" in refused
         assert 'id="program-call"' not in refused, "nobody loads a program with a number that he did not give"
-        assert "Must leave 550 to 599 free" in engineer.open(f"{address}&first_register=500")
+        assert "Must leave 550 to 603 free" in engineer.open(f"{address}&first_register=500")
         assert "Must be a variable of the control" in engineer.open(f"{address}&measured=1;M30")
         engineer.open(f"{address}&number=NaN&time_out=1e99&largest_step=x&go_on=q&control=heidenhain")
 
