@@ -263,6 +263,7 @@ def test_no_more_wait_than_can_be_made(bores: Shop) -> None:
 class TestKilled:
     """SIGKILL in the middle of it; nobody was told anything."""
 
+    @pytest.mark.long
     def test_it_goes_on_behind_what_was_ready(self, bores: Shop, server: Server) -> None:
         with held_up(bores) as let_one_pass:
             number = ask(bores, characteristics=keys(4))["id"]
@@ -287,11 +288,15 @@ class TestKilled:
             assert os.getpriority(os.PRIO_PROCESS, maker) >= NICE, "readings go first"
             os.kill(maker, signal.SIGKILL)
             (failure,) = until(lambda: failures(bores, number))
+            left = ready(server, number)
         assert "the process that makes reports ended with -9" in failure["error"]
         with psycopg.connect(server.database.dsn) as connection:
             connection.execute("UPDATE job_failure SET retry_at = now()")  # not in a minute
         job = done(bores, number)
         assert (job["state"], job["done"], job["problems"]) == ("done", 2, 0)
+        whole = fetched(bores, number)
+        assert {place: whole.read(f"report-bore-{place}.pdf") for place in left} == left, "it was not made again"
+        assert len(left) == 1
         until(lambda: not failures(bores, number))
 
     @pytest.mark.long
