@@ -10,7 +10,6 @@ from typing import Any, NamedTuple
 from urllib.parse import urlsplit
 
 import pytest
-from axe_playwright_python.base import AXE_SCRIPT
 from playwright.sync_api import Browser, Page, expect
 from pypdf import PdfReader
 
@@ -125,7 +124,6 @@ def visitor(browser: Browser, server: Server, admin: Person) -> Iterator[tuple[P
     """The one browser in which somebody goes from page to page, and what it complained about."""
     complaints: list[str] = []
     with new_page(browser, server.url, complaints) as page:
-        page.context.add_init_script(AXE_SCRIPT)
         admin.sign_in(page)
         yield page, complaints
 

@@ -968,12 +968,12 @@ def test_it_is_the_same_through_a_socket(server: Server) -> None:
     """A body for the door of readings, one for everything else, and an address with names, a number and a query."""
     place = Place(server)
     for attempt, name in (
-        (partial(bad_fields, of=4), "POST /api/v1/readings"),
-        (partial(no_body, of=4), "POST /api/v1/readings"),
-        (partial(bad_fields, of=4), "PUT /api/v1/machines/{machine}/tools/{tool}"),
-        (partial(no_body, of=4), "PUT /api/v1/machines/{machine}/tools/{tool}"),
-        (partial(bad_addresses, of=4), "GET /api/v1/corrections/{machine}/{number}"),
-        (partial(bad_queries, of=4), "GET /api/v1/readings"),
+        (partial(bad_fields, of=8), "POST /api/v1/readings"),
+        (partial(no_body, of=8), "POST /api/v1/readings"),
+        (partial(bad_fields, of=8), "PUT /api/v1/machines/{machine}/tools/{tool}"),
+        (partial(no_body, of=8), "PUT /api/v1/machines/{machine}/tools/{tool}"),
+        (partial(bad_addresses, of=8), "GET /api/v1/corrections/{machine}/{number}"),
+        (partial(bad_queries, of=8), "GET /api/v1/readings"),
         (no_key, "GET /api/v1/readings"),
         (wrong_methods, "GET /api/v1/readings"),
     ):
