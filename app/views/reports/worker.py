@@ -2,7 +2,7 @@
 
 Anyone who works on a job holds an advisory lock with its number, on a connection of its own: when the server ends, however it
 ends, the lock is free, and another server – or the same one, restarted – goes on behind the last characteristic that is ready.
-The process is begun when something waits, and ends when nothing has come for a while: it would hold the interpreter that
+The process is begun when something waits, and ends when nothing has come for a while: in the server it would hold the interpreter that
 readings need, and memory that nobody does.
 """
 
@@ -60,7 +60,7 @@ class ReportWorker:
         self._wake.set()
 
     async def stop(self) -> None:
-        """End in the middle of a characteristic: it and the rest are somebody else's, or tomorrow's."""
+        """End at once, in the middle of a characteristic: another server, or this one started again, makes it and the rest."""
         self._closing.set()
         self._wake.set()
         if self._maker is not None:
