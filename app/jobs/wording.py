@@ -11,6 +11,7 @@ def job_word(name: str) -> str:
     return {
         "corrections_expire": _("Expired corrections are withdrawn"),
         "gains": _("Gain of corrections"),
+        "disagreements": _("Characteristics that disagree"),
         "tool_lives": _("Tool life alarms"),
         "wear_and_hunting": _("Wear forecast and over-correction"),
         "calibrations_due": _("Calibrations due"),

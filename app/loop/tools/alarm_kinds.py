@@ -196,6 +196,43 @@ UNUSUAL_GAIN = register(
         },
     )
 )
+
+
+def _disagree(alarm: Alarm) -> str:
+    data = alarm.data
+    return _(
+        "{down} and {up} take each other's corrections of tool {tool} back: one asked for {mean_down}, the other for {mean_up}, "
+        "{n} times in turn. One offset cannot bring both to their targets."
+    ).format(
+        down=data.get("down"),
+        up=data.get("up"),
+        mean_down=um(data.get("mean_down")),
+        mean_up=um(data.get("mean_up")),
+        n=data.get("times"),
+        tool=alarm.tool_memory,
+    )
+
+
+CHARACTERISTICS_DISAGREE = register(
+    AlarmKind(
+        "characteristics_disagree",
+        word=lambda: _("Characteristics disagree"),
+        sentence=_disagree,
+        what_to_do=lambda: _(
+            "Check target, empirical value (R11) and factor of both, and whether this tool and edge cuts both. Else let one of "
+            "them correct and the other measure only, or give it an offset of its own. Correcting goes on meanwhile."
+        ),
+        icon="hunting",
+        comments={
+            "noted": lambda: [
+                _("Target corrected"),
+                _("Factor corrected"),
+                _("One measures only"),
+                _("Another tool cuts it"),
+            ],
+        },
+    )
+)
 PAUSING = (OFFSET_DIFFERS.name, OPPOSITE_EFFECT.name)  # nothing is corrected through the tool until they are answered
 TOOL_LIFE = register(
     AlarmKind(

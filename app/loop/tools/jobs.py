@@ -16,8 +16,8 @@ from app.loop.machines.queries import lock_machines
 from app.loop.tables.machines import Machine
 from app.loop.tables.readings import Stream
 from app.loop.tables.tools import OUTSTANDING, Correction, Tool
-from app.loop.tools import gain_queries, wording
-from app.loop.tools.alarm_kinds import TOOL_LIFE, UNUSUAL_GAIN
+from app.loop.tools import disagreement_queries, gain_queries, wording
+from app.loop.tools.alarm_kinds import CHARACTERISTICS_DISAGREE, TOOL_LIFE, UNUSUAL_GAIN
 from app.loop.tools.events import alarm_raised
 from app.loop.tools.lives_queries import plan_of
 
@@ -182,8 +182,22 @@ def tell_gain(session: Session, unit: Unit) -> None:
         publish(session, alarm_raised(machine, alarm) | {"characteristic": key})
 
 
+def tell_disagreement(session: Session, unit: Unit) -> None:
+    """Two characteristics that take each other's corrections of a tool back raise *characteristics disagree*, once until it is answered."""
+    machine_id, number = (int(part) for part in unit.key)
+    machine = session.get_one(Machine, machine_id)
+    found = disagreement_queries.disagreement_on(session, machine_id, number)
+    if found is None:
+        return
+    lock_machines(session, [machine_id])
+    if alarms.active_of_tool(session, machine_id, number, CHARACTERISTICS_DISAGREE) is None:
+        alarm = alarms.raise_for_tool(session, machine_id, number, CHARACTERISTICS_DISAGREE, found)
+        publish(session, alarm_raised(machine, alarm))
+
+
 JOBS = (
     PeriodicJob("gains", corrected_tools, tell_gain),
+    PeriodicJob("disagreements", corrected_tools, tell_disagreement),
     PeriodicJob("corrections_expire", expired, expire_correction),
     PeriodicJob("tool_lives", spent_tools, tell_tool_life),
 )

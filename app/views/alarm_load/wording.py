@@ -27,6 +27,7 @@ def made_by(kind: str) -> str:
         "offset_differs": _("offset that the control reports"),
         "opposite_effect": _("factor, or the offset register"),
         "unusual_gain": _("factor"),
+        "characteristics_disagree": _("targets and empirical values of two characteristics"),
         "corrections_not_taken": _("INBAND_CORRECTIONS_TAKEN_WITHIN"),
         "tool_life": _("planned life of the edge"),
         "measurement_missed": _("control plan"),

@@ -69,6 +69,7 @@ DATA: dict[str, list[dict[str, Any]]] = {
         {"waiting": 4, "first": 12, "since": _AT},
     ],
     "unusual_gain": [_GAIN | {"verdict": verdict} for verdict in ("none", "weak", "strong", "opposite")],
+    "characteristics_disagree": [{"down": "a", "up": "b", "mean_down": -0.02, "mean_up": 0.02, "times": 6}],
     "tool_life": [{"by": "parts", "parts": 520, "planned_parts": 500}, {"total": 0.21, "planned_total": 0.2}],
     "bridge_silent": [{"received_at": _AT}],
     "bridge_backing_up": [{"state": "full", "waiting": 900}, {"waiting": 900, "oldest_waiting_at": _AT}],
