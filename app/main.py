@@ -72,7 +72,8 @@ from app.loop.quarantine import pages as quarantine_pages
 from app.loop.reactions import api as reactions
 from app.loop.reactions import pages as reaction_pages
 from app.loop.readings import api as readings
-from app.loop.readings import aqdef_api, results_actions, table_api
+from app.loop.readings import results_actions, table_api
+from app.loop.readings.aqdef import api as aqdef_api
 from app.loop.readings.by_hand import api as by_hand
 from app.loop.readings.door import Directory, ReadingsDoor
 from app.loop.readings.importing import pages as import_pages

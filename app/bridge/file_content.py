@@ -37,14 +37,16 @@ from app.bridge.patterns import LONGEST_LINE, Patterns, TooSlow
 from app.core.ring import INCH
 from app.errors import TooManyRequests
 from app.files.apart import apart, spend
-from app.files.formats import aqdef, aqdef_values, delimited, spreadsheet
-from app.files.formats.aqdef_context import context_of
-from app.files.formats.aqdef_keys import Keys
-from app.files.formats.aqdef_times import WallClock, day_order, time_of
+from app.files.aqdef import description as aqdef
+from app.files.aqdef import values as aqdef_values
+from app.files.aqdef.context import context_of
+from app.files.aqdef.times import WallClock, day_order, time_of
+from app.files.aqdef.values import Keys
+from app.files.formats import delimited, spreadsheet
 from app.files.formats.cell_values import Slashed, Unreadable, same_number, slashed, zone_named
 from app.files.formats.file_times import times_of
 from app.files.formats.headings import is_summary
-from app.files.formats.repeats import Repeats
+from app.files.formats.repeats import Remark, Repeats
 from app.files.formats.units import LENGTHS, UnknownUnit, beside, in_celsius, length_unit, unit_in, unit_of_name
 
 NAMES: Final = {"csv": "*.csv", "xlsx": "*.xls[xm]", "ndjson": "*.ndjson", "text": "*.txt", "aqdef": "*.df[qdxQDX]"}
@@ -215,7 +217,7 @@ class _Reader:
             if isinstance(row, Fault):
                 self.content.faults.append(row)
                 continue
-            if isinstance(row, aqdef.Remark):
+            if isinstance(row, Remark):
                 self._remark(row)
                 continue
             fields = {name: cell_of(row, column) for name, column in columns.items() if has(row, column)}
@@ -227,9 +229,7 @@ class _Reader:
                     del fields[name]
                     if columns[name] not in units:
                         units[columns[name]] = None
-                        self._leave_out(
-                            name, aqdef.Remark(line, columns[name], "", "names another scale than °C; left out")
-                        )
+                        self._leave_out(name, Remark(line, columns[name], "", "names another scale than °C; left out"))
             if "unit" not in self.settings.columns:
                 fields["unit"] = beside(row, "unit")
             sizes = (
@@ -260,7 +260,7 @@ class _Reader:
     def _statistics(self, line: int, label: str) -> None:
         """A row of limits or statistics, which is no part."""
         if self.settings.statistics == "skip":
-            self._remark(aqdef.Remark(line, "", label, "holds limits or statistics; passed over"))
+            self._remark(Remark(line, "", label, "holds limits or statistics; passed over"))
             return
         reason = (
             'holds limits or statistics, no part: let the program write readings alone, or set statistics = "skip".'
@@ -300,11 +300,11 @@ class _Reader:
         zone, keys = self.zone, Keys()
         clocks = {} if zone is None else {index: WallClock(zone) for index in description.characteristics}
         items = list(aqdef_values.values(source, description))
-        written = (item.fields.get("K0004", "") for item in items if not isinstance(item, aqdef.Remark))
+        written = (item.fields.get("K0004", "") for item in items if not isinstance(item, Remark))
         together = times_of(written, read=time_of).live
         order = day_order(self.settings.day_first) or together.order
         for item in items:
-            if isinstance(item, aqdef.Remark):
+            if isinstance(item, Remark):
                 self._remark(item)
                 continue
             characteristic = description.characteristics[item.characteristic]
@@ -314,13 +314,13 @@ class _Reader:
                 continue
             if characteristic.counts:
                 self.content.skipped += 1
-                self._remark(aqdef.Remark(item.line, "", name, "counts parts, it measures nothing; passed over"))
+                self._remark(Remark(item.line, "", name, "counts parts, it measures nothing; passed over"))
                 continue
             if order is None and slashed(item.fields.get("K0004", "")) is Slashed.EITHER:
                 self._fault(item.line, "K0004", "could be day/month or month/day: set day_first to true or false.")
                 continue
             value = aqdef_values.read_value(item, order)
-            if isinstance(value, aqdef.Remark):
+            if isinstance(value, Remark):
                 self._remark(value)
                 continue
             if value is not None and value.at is not None:
@@ -332,7 +332,7 @@ class _Reader:
                 alone = keys.of(item, description.identity(characteristic), measured, value.at)
             if value is None or value.attribute:
                 self.content.skipped += 1
-                self._remark(aqdef.Remark(item.line, "", name, _passed_over(item, value)))
+                self._remark(Remark(item.line, "", name, _passed_over(item, value)))
             else:
                 self._measured(item, key, name, value, description, clocks.get(item.characteristic), alone)
 
@@ -383,13 +383,13 @@ class _Reader:
                 return self.machine.characteristics[name], name
         return None, names[0] if names else str(characteristic.index)
 
-    def _remark(self, remark: aqdef.Remark) -> None:
+    def _remark(self, remark: Remark) -> None:
         if remark.wrong:
             self._fault(remark.line, remark.field, remark.reason, remark.value)
         else:
             self.remarks.add(remark)
 
-    def _leave_out(self, temperature: str, remark: aqdef.Remark) -> None:
+    def _leave_out(self, temperature: str, remark: Remark) -> None:
         self.remarks.add(remark)
         self.left_out.setdefault(temperature, Repeats()).add(remark)
 
@@ -405,7 +405,7 @@ class _Reader:
             return
         if str(fields.get("measured")).strip() in self.settings.missing:
             self.content.skipped += 1
-            self._remark(aqdef.Remark(line, "", name, "is marked as missing; passed over"))
+            self._remark(Remark(line, "", name, "is marked as missing; passed over"))
             return
         body: dict[str, Any] = {"characteristic": key}
         try:
@@ -426,7 +426,7 @@ class _Reader:
                     put(body, field_, read)
                 elif words := form.left_out(field_, value):
                     column = self.settings.columns.get(field_, field_)
-                    self._leave_out(field_, aqdef.Remark(line, column, str(value)[:40], words))
+                    self._leave_out(field_, Remark(line, column, str(value)[:40], words))
             except Unreadable as error:
                 column = self.settings.columns.get(field_, field_ if name == EVERY or "measured" in fields else name)
                 self._fault(line, column, f"{error}.", str(value)[:40])

@@ -7,9 +7,9 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from app.bridge.json_text import read_json
-from app.files.formats import aqdef, delimited
+from app.files.formats import delimited
 from app.files.formats.headings import TOP, Heading, as_wide, heading, others
-from app.files.formats.repeats import Repeats
+from app.files.formats.repeats import Remark, Repeats
 from app.files.formats.units import LENGTHS, is_unit_column, unit_above, unit_in
 
 
@@ -36,13 +36,13 @@ def reasons(faults: Iterable[Fault]) -> list[str]:
     whole, lines = dict[str, None](), Repeats()
     for fault in faults:
         if fault.line:
-            lines.add(aqdef.Remark(fault.line, fault.field, fault.value, fault.reason))
+            lines.add(Remark(fault.line, fault.field, fault.value, fault.reason))
         else:
             whole[str(fault)] = None
     return [*whole, *lines.sentences()]
 
 
-Found = Mapping[str, Any] | Fault | aqdef.Remark
+Found = Mapping[str, Any] | Fault | Remark
 """A row by its columns, or a remark on it."""
 
 
@@ -83,7 +83,7 @@ def csv_rows(path: Path, table: Table) -> Iterator[tuple[int, Found]]:
             if isinstance(row, delimited.Unusable):
                 yield row.line or 0, Fault(row.line, "", str(row))
             elif tuple(cell.strip() for cell in row.cells) == names:
-                yield row.line, aqdef.Remark(row.line, "", "", "is the heading again; passed over")
+                yield row.line, Remark(row.line, "", "", "is the heading again; passed over")
             else:
                 yield row.line, dict(zip(names, row.cells, strict=False))
     except UnicodeError:

@@ -16,22 +16,22 @@ if TYPE_CHECKING:
 
     from app.core.period import Period
     from app.db.engine import Database
-    from app.loop.readings.importing.aqdef.actions import Outcome, Result
-    from app.loop.readings.importing.aqdef.matching import Content
-    from app.loop.readings.importing.aqdef.sorting import Wishes
+    from app.loop.readings.aqdef.actions import Outcome, Result
+    from app.loop.readings.aqdef.matching import Content
+    from app.loop.readings.aqdef.sorting import Wishes
 
 
 def is_aqdef(file: Path) -> bool:
     """Tell by its name."""
-    from app.files.formats.aqdef import ENDINGS
+    from app.files.aqdef.description import ENDINGS
 
     return file.suffix.lower() in ENDINGS
 
 
 def wishes_for(zone: ZoneInfo, unit: str | None, encoding: str | None, *, day_first: bool | None) -> "Wishes":
     """The choices that options say."""
-    from app.files.formats.aqdef_times import day_order
-    from app.loop.readings.importing.aqdef.sorting import Wishes
+    from app.files.aqdef.times import day_order
+    from app.loop.readings.aqdef.sorting import Wishes
 
     return Wishes(zone, day_order(day_first), unit, encoding)
 
@@ -49,9 +49,9 @@ def import_file(
     progress: Any,
 ) -> "Outcome":
     """Import a file and say what it came to. Raises `Flawed`, and `typer.BadParameter` for what cannot be chosen."""
-    from app.files.formats.aqdef import Source
+    from app.files.aqdef.description import Source
     from app.files.formats.delimited import Unusable
-    from app.loop.readings.importing.aqdef import actions, matching
+    from app.loop.readings.aqdef import actions, matching
 
     try:
         source = Source.at(file, wishes.encoding)
@@ -83,7 +83,7 @@ def import_file(
 
 
 def _said(mapping: str, characteristic: str, found: "list[Content]") -> dict[int, str]:
-    from app.loop.readings.importing.aqdef import matching
+    from app.loop.readings.aqdef import matching
 
     if characteristic:
         lengths = [each for each in found if not each.obstacle]
@@ -99,7 +99,7 @@ def _said(mapping: str, characteristic: str, found: "list[Content]") -> dict[int
 
 def _tell(found: "list[Content]", chosen: dict[int, str], encoding: str) -> None:
     """Print how the file is understood."""
-    from app.loop.readings.importing.aqdef.matching import NEW
+    from app.loop.readings.aqdef.matching import NEW
 
     say(_("{count} characteristics, {encoding} text.").format(count=len(found), encoding=encoding.removesuffix("-sig")))
     for each in found:
@@ -159,7 +159,7 @@ def export_file(
 ) -> None:
     """Write readings of these characteristics, and say what was made to fit."""
     from app.access.audit import actions as audit
-    from app.loop.readings.aqdef_export import write_aqdef
+    from app.loop.readings.aqdef.export import write_aqdef
 
     done = write_aqdef(session, keys, output, period=period, last=last)
     for key in dict.fromkeys(keys):

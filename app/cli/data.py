@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from datetime import datetime
 
     from app.core.period import Period
-    from app.loop.readings.importing.aqdef.sorting import Wishes as AqdefWishes
+    from app.loop.readings.aqdef.sorting import Wishes as AqdefWishes
     from app.loop.readings.importing.cells import Flaw
     from app.loop.readings.importing.history import Flawed, Summary
     from app.loop.readings.importing.layout import Layout, Wishes

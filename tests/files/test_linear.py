@@ -16,8 +16,11 @@ from app.core import fits, natural, number_text
 from app.core.printed_line import LineReader
 from app.core.rotary import results
 from app.errors import Invalid
-from app.files.formats import aqdef, aqdef_times, aqdef_values, cell_values, delimited, markup, units
-from app.files.formats.aqdef import Source
+from app.files.aqdef import description as aqdef
+from app.files.aqdef import times as aqdef_times
+from app.files.aqdef import values as aqdef_values
+from app.files.aqdef.description import Source
+from app.files.formats import cell_values, delimited, markup, units
 from app.files.formats.rotary_protocol import read_protocol
 from app.geometry.alignment import form_reader as alignment
 from app.geometry.geometric_form import form_reader as geometric_form

@@ -2,12 +2,26 @@
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
+from typing import NamedTuple
 
-from app.files.formats.aqdef import Remark
 from app.language.i18n import _
 
 FIRST = 3
 MOST = 200  # different ones
+
+
+class Remark(NamedTuple):
+    """Something about a line that a person should know. wrong: its value cannot be taken; else it is only said."""
+
+    line: int
+    field: str
+    value: str
+    reason: str
+    wrong: bool = False
+
+    def __str__(self) -> str:
+        where = _("line {line}").format(line=self.line) + (f", {self.field}" if self.field else "")
+        return f"{where}: {f'{self.value!r} ' if self.value else ''}{self.reason}"
 
 
 def lines_of(first: Sequence[int], count: int | None = None) -> str:

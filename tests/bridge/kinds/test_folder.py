@@ -20,7 +20,7 @@ from app.bridge.kinds.folder import Folder
 from app.bridge.links import ControlAway, Decided, Misconfigured, Position, Received, carries_decisions
 from app.bridge.store import Store
 from app.bridge.unit import Unit
-from app.files.formats.aqdef_values import OF_FIELD as F
+from app.files.aqdef.values import OF_FIELD as F
 from app.simulators.controls.folder import FolderSimulator
 from app.simulators.controls.model import Model
 from tests.bridge.plant import PATIENCE, controlled, store_in, until

@@ -8,7 +8,7 @@ from app.files.formats.cell_values import Unreadable, folded
 from app.files.formats.column_names import LOWER_LIMITS, UPPER_LIMITS
 from app.files.formats.units import UnknownUnit, agreed, in_mm, unit_in, unit_of_name
 from app.language.i18n import _
-from app.loop.readings.importing.aqdef.matching import Content, not_new
+from app.loop.readings.aqdef.matching import Content, not_new
 from app.loop.readings.importing.columns import is_unsigned
 from app.loop.readings.importing.layout import Drawn, Layout
 

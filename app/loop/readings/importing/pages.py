@@ -18,11 +18,11 @@ from app.language.i18n import _
 from app.language.times import plant_zone
 from app.loop.characteristics import queries as characteristics
 from app.loop.machines import queries as machines
+from app.loop.readings.aqdef import form as aqdef_form
+from app.loop.readings.aqdef.actions import machine_for
+from app.loop.readings.aqdef.matching import NEW, Content
 from app.loop.readings.importing import drawn, uploads, wide
 from app.loop.readings.importing.actions import import_readings
-from app.loop.readings.importing.aqdef import form as aqdef_form
-from app.loop.readings.importing.aqdef.actions import machine_for
-from app.loop.readings.importing.aqdef.matching import NEW, Content
 from app.loop.readings.importing.columns import DRAWN
 from app.loop.readings.importing.history import Flawed
 from app.loop.readings.importing.layout import NO_DIGIT, Layout, Wishes, refuse_incomplete

@@ -13,7 +13,8 @@ from typing import BinaryIO, NamedTuple
 
 from app.errors import Invalid, NotFound
 from app.files.apart import apart, spend, sweep
-from app.files.formats import aqdef, delimited, spreadsheet
+from app.files.aqdef import description as aqdef
+from app.files.formats import delimited, spreadsheet
 from app.language.i18n import _
 from app.settings import Settings
 

@@ -15,9 +15,9 @@ from app.language.i18n import _
 from app.loop.characteristics import queries as characteristics
 from app.loop.characteristics.queries import CurrentCharacteristic
 from app.loop.readings import queries
+from app.loop.readings.aqdef.actions import machine_for, set_up
+from app.loop.readings.aqdef.matching import NEW, Content
 from app.loop.readings.importing import drawn
-from app.loop.readings.importing.aqdef.actions import machine_for, set_up
-from app.loop.readings.importing.aqdef.matching import NEW, Content
 from app.loop.readings.importing.cells import MOST_FLAWS, Flaw
 from app.loop.readings.importing.columns import ORIGIN
 from app.loop.readings.importing.history import Flawed, Progress, Summary, store_history

@@ -28,14 +28,14 @@ from app.bridge.plausible import Target, far_off
 from app.cli import data
 from app.core.parameters import read
 from app.errors import InbandError
-from app.files.formats.aqdef_values import OF_CHARACTERISTIC as C
-from app.files.formats.aqdef_values import OF_FIELD as F
+from app.files.aqdef.values import OF_CHARACTERISTIC as C
+from app.files.aqdef.values import OF_FIELD as F
 from app.loop.readings import exporting, queries, table_api
+from app.loop.readings.aqdef import actions as aqdef_actions
+from app.loop.readings.aqdef import content as aqdef_content
+from app.loop.readings.aqdef.matching import parameters_of
 from app.loop.readings.importing import drawn, uploads
 from app.loop.readings.importing import lines as importing
-from app.loop.readings.importing.aqdef import actions as aqdef_actions
-from app.loop.readings.importing.aqdef import content as aqdef_content
-from app.loop.readings.importing.aqdef.matching import parameters_of
 from app.loop.readings.importing.layout import Wishes, look
 from tests.conftest import NewDatabase, drop_database
 from tests.in_process import InProcess, in_process

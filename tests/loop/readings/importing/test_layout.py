@@ -14,7 +14,7 @@ from app.bridge.file_rows import Table, cell_of, csv_rows
 from app.errors import Invalid
 from app.files.formats.delimited import BLANKS
 from app.files.formats.spreadsheet import text_of
-from app.loop.readings.importing.aqdef.matching import parameters_of
+from app.loop.readings.aqdef.matching import parameters_of
 from app.loop.readings.importing.cells import Flaw, Passed
 from app.loop.readings.importing.drawn import contents
 from app.loop.readings.importing.layout import MOST_COLUMNS, NO_DIGIT, Wishes, look

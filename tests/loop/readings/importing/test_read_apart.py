@@ -10,11 +10,11 @@ import pytest
 from app.errors import Invalid
 from app.files import apart
 from app.files.apart import Limits
-from app.files.formats.aqdef import Source
-from app.loop.readings.importing.aqdef import actions
-from app.loop.readings.importing.aqdef.content import put_down
-from app.loop.readings.importing.aqdef.matching import contents
-from app.loop.readings.importing.aqdef.sorting import Wishes as AqdefWishes
+from app.files.aqdef.description import Source
+from app.loop.readings.aqdef import actions
+from app.loop.readings.aqdef.content import put_down
+from app.loop.readings.aqdef.matching import contents
+from app.loop.readings.aqdef.sorting import Wishes as AqdefWishes
 from app.loop.readings.importing.cells import items
 from app.loop.readings.importing.layout import Wishes, look
 from app.loop.readings.importing.lines import Line, lines, look_apart, read_apart

@@ -11,13 +11,13 @@ import pytest
 from openpyxl import Workbook
 
 from app.db.engine import Database
+from app.files.aqdef.description import Source
 from app.files.formats import spreadsheet
-from app.files.formats.aqdef import Source
 from app.loop.readings import actions, exporting, queries
-from app.loop.readings.aqdef_export import write_aqdef
-from app.loop.readings.importing.aqdef import actions as aqdef
-from app.loop.readings.importing.aqdef import matching
-from app.loop.readings.importing.aqdef.sorting import Wishes
+from app.loop.readings.aqdef import actions as aqdef
+from app.loop.readings.aqdef import matching
+from app.loop.readings.aqdef.export import write_aqdef
+from app.loop.readings.aqdef.sorting import Wishes
 from app.loop.readings.importing.history import Flawed
 from app.loop.readings.schemas import ReadingIn
 from app.loop.readings.writer.batch import store_batch

@@ -10,10 +10,10 @@ import pytest
 
 from app.bridge.file_content import read_content
 from app.db.engine import Database
-from app.files.formats.aqdef import Source
-from app.files.formats.aqdef_values import OF_FIELD as F
-from app.loop.readings.importing.aqdef.sorting import Kept, Wanted, sort_out
-from app.loop.readings.importing.aqdef.sorting import Wishes as AqdefWishes
+from app.files.aqdef.description import Source
+from app.files.aqdef.values import OF_FIELD as F
+from app.loop.readings.aqdef.sorting import Kept, Wanted, sort_out
+from app.loop.readings.aqdef.sorting import Wishes as AqdefWishes
 from app.loop.readings.importing.cells import Flaw
 from app.loop.readings.importing.layout import Wishes, look
 from app.loop.readings.importing.lines import Line, lines

@@ -4,16 +4,15 @@ import re
 from collections.abc import Callable
 from typing import Any
 
-from app.files.formats.aqdef import Description, Remark
-from app.files.formats.aqdef_values import Measured, Value, process_of
+from app.files.aqdef.description import Description
+from app.files.aqdef.fields import CATALOGUES, FIELDS
+from app.files.aqdef.values import Measured, Value, process_of
+from app.files.formats.repeats import Remark
 from app.language.i18n import _
 
 LONGEST = 128  # characters of a text
 LONGEST_COMMENT = 1000
 HIGHEST_NEST = 999_999
-_WITH_A_PLACE = {
-    "K0001", "K0002", "K0004", "K0005", "K0006", "K0007", "K0008", "K0009", "K0010", "K0011", "K0012", "K0014", "K0053",
-}  # fmt: skip
 TEMPERATURES = {"part temperature, °C": "part_temperature", "machine temperature, °C": "machine_temperature"}
 """Process parameters (K0011) that are fields of the context, by their names in the catalogue."""
 _CONTROL = re.compile(r"[\x00-\x1f\x7f-\x9f]+")
@@ -37,8 +36,11 @@ def context_of(
             remark(name, plain, _("is longer than {most} characters; it is shortened").format(most=most))
         return plain[:most].strip()
 
-    named = description.named
-    further = {name: text for name, text in value.fields.items() if name not in _WITH_A_PLACE}
+    def named(name: str, entry: int | str) -> str:
+        catalogue = CATALOGUES[name]
+        return fit(name, description.named(entry, catalogue.long, catalogue.short))
+
+    further = {name: text for name, text in value.fields.items() if name not in FIELDS or not FIELDS[name].read}
     if read.attribute:
         further["K0002"] = str(read.attribute)
     nest = read.nest
@@ -50,17 +52,17 @@ def context_of(
     if process is None:
         further["K0011"] = read.process
         remark("K0011", read.process, _("is not written as number/value; it is kept as a text"))
-    sizes = {fit("K0011", named(number, "K4243", "K4242")) or "0": size for number, size in (process or {}).items()}
+    sizes = {named("K0011", number) or "0": size for number, size in (process or {}).items()}
     temperatures = {name: sizes.pop(each) for each, name in TEMPERATURES.items() if each in sizes}
     found = {
         "order": fit("K0053", read.order),
         "batch": fit("K0006", read.batch),
         "nest": nest,
-        "operator": fit("K0008", named(read.operator, "K4093", "K4092")),
-        "machine": fit("K0010", named(read.machine, "K4063", "K4062")),
-        "gauge": fit("K0012", named(read.gauge, "K4073", "K4072")),
+        "operator": named("K0008", read.operator),
+        "machine": named("K0010", read.machine),
+        "gauge": named("K0012", read.gauge),
         "comment": fit("K0009", read.text, LONGEST_COMMENT),
-        "events": [text for each in read.events if (text := fit("K0005", named(each, "K4223", "K4222")))],
+        "events": [text for each in read.events if (text := named("K0005", each))],
         "process": sizes,
         "fields": {name: fitted for name, text in further.items() if (fitted := fit(name, text, LONGEST_COMMENT))},
     }

@@ -10,20 +10,20 @@ from pydantic import BaseModel, Field
 from app.access.deps import AnyCaller, Engineer
 from app.db.engine import Database
 from app.errors import Invalid
+from app.files.aqdef.description import Source
+from app.files.aqdef.times import day_order
 from app.files.formats import cell_values
-from app.files.formats.aqdef import Source
-from app.files.formats.aqdef_times import day_order
 from app.files.formats.cell_values import Unreadable
 from app.files.formats.repeats import once
 from app.files.formats.units import Unit
 from app.language.i18n import _
 from app.language.times import plant_zone
 from app.loop.characteristics import queries as characteristics
-from app.loop.readings.aqdef_export import write_aqdef
-from app.loop.readings.importing.aqdef import actions, matching
-from app.loop.readings.importing.aqdef.actions import Outcome, Result
-from app.loop.readings.importing.aqdef.matching import Content
-from app.loop.readings.importing.aqdef.sorting import Wishes
+from app.loop.readings.aqdef import actions, matching
+from app.loop.readings.aqdef.actions import Outcome, Result
+from app.loop.readings.aqdef.export import write_aqdef
+from app.loop.readings.aqdef.matching import Content
+from app.loop.readings.aqdef.sorting import Wishes
 from app.web.api import api_router, problems
 from app.web.choice import InPeriod
 from app.web.deps import SessionDep

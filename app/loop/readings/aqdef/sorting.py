@@ -14,15 +14,15 @@ from zoneinfo import ZoneInfo
 
 import msgspec
 
-from app.files.formats import aqdef, aqdef_values
-from app.files.formats.aqdef import Description, Remark, Source
-from app.files.formats.aqdef_context import context_of
-from app.files.formats.aqdef_keys import Keys
-from app.files.formats.aqdef_times import WallClock, time_of
-from app.files.formats.aqdef_values import Value
+from app.files.aqdef import description as aqdef
+from app.files.aqdef import values as aqdef_values
+from app.files.aqdef.context import context_of
+from app.files.aqdef.description import Description, Source
+from app.files.aqdef.times import WallClock, time_of
+from app.files.aqdef.values import Keys, Value
 from app.files.formats.cell_values import DayOrder, Slashed, Unreadable, slashed
 from app.files.formats.file_times import FileTimes, times_of
-from app.files.formats.repeats import Repeats
+from app.files.formats.repeats import Remark, Repeats
 from app.language.i18n import _
 from app.loop.readings.importing.cells import MOST_FLAWS, Flaw, fingerprint
 from app.loop.readings.origin import EMPIRICAL, Origin, named_by

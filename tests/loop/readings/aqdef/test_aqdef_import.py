@@ -13,16 +13,16 @@ from sqlalchemy import text
 from app.core.parameters import read
 from app.db.engine import Database
 from app.errors import Invalid
-from app.files.formats.aqdef import Source
-from app.files.formats.aqdef_values import OF_CHARACTERISTIC as C
-from app.files.formats.aqdef_values import OF_FIELD as F
+from app.files.aqdef.description import Source
+from app.files.aqdef.values import OF_CHARACTERISTIC as C
+from app.files.aqdef.values import OF_FIELD as F
 from app.loop.characteristics import queries as characteristic_queries
 from app.loop.machines import actions as machines
 from app.loop.machines.schemas import MachineIn
-from app.loop.readings.importing.aqdef import actions, matching
-from app.loop.readings.importing.aqdef.actions import Outcome
-from app.loop.readings.importing.aqdef.matching import NEW
-from app.loop.readings.importing.aqdef.sorting import Wishes
+from app.loop.readings.aqdef import actions, matching
+from app.loop.readings.aqdef.actions import Outcome
+from app.loop.readings.aqdef.matching import NEW
+from app.loop.readings.aqdef.sorting import Wishes
 from app.loop.readings.importing.history import Flawed
 from tests.forked import inband
 from tests.loop.readings.importing.test_history import scalar, set_up, stored
@@ -307,7 +307,7 @@ def test_where_nothing_is_chosen_it_is_said_why(plant: Database, tmp_path: Path)
 
 def test_without_a_tolerance_nothing_is_set_up() -> None:
     def reason(**fields: str) -> str:
-        from app.files.formats.aqdef import Characteristic, Description
+        from app.files.aqdef.description import Characteristic, Description
 
         description = Description(characteristics={1: Characteristic(1, 1, {"K2142": "mm"} | fields)})
         return matching.contents(description)[0].not_new

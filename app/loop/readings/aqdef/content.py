@@ -10,10 +10,10 @@ import msgspec
 
 from app.errors import Invalid
 from app.files.apart import PREFIX, apart, spend
-from app.files.formats.aqdef import Source
+from app.files.aqdef.description import Source
 from app.language.i18n import _, ngettext
-from app.loop.readings.importing.aqdef.matching import Content
-from app.loop.readings.importing.aqdef.sorting import Kept, Sorted, Wanted, Wishes, sort_out
+from app.loop.readings.aqdef.matching import Content
+from app.loop.readings.aqdef.sorting import Kept, Sorted, Wanted, Wishes, sort_out
 from app.loop.readings.importing.cells import Flaw
 from app.loop.readings.importing.lines import Line
 from app.loop.readings.schemas import reading_of

@@ -1,6 +1,6 @@
 """AQDEF files (Q-DAS ASCII transfer format) written: one line for each part, with a value of every characteristic measured on it.
 
-Fields, their lengths and catalogues are those of version 12; see `app.files.formats.aqdef`. Whether a system takes a file is
+Whether a system takes a file is
 said by its certification, which this is not.
 """
 
@@ -15,18 +15,11 @@ from pathlib import Path
 from typing import NamedTuple
 
 from app.core.natural import NaturalLimit
-from app.files.formats.aqdef import encoding_of
-from app.files.formats.aqdef_values import OF_CHARACTERISTIC, OF_FIELD
+from app.files.aqdef.description import encoding_of
+from app.files.aqdef.fields import CATALOGUES, Catalogue, most_of
+from app.files.aqdef.values import OF_CHARACTERISTIC, OF_FIELD
 from app.language.i18n import _
 
-LENGTHS = {
-    "K1001": 30, "K1002": 80, "K1053": 40, "K1081": 24, "K1082": 40, "K1085": 40, "K1086": 40, "K2001": 20, "K2002": 80,
-    "K2142": 20, "K2402": 40, "K4062": 40, "K4063": 100, "K4072": 40, "K4073": 80, "K4092": 50, "K4093": 50, "K4222": 40,
-    "K4223": 100, "K4242": 40, "K4243": 100, "K0014": 40, "K0053": 20,
-    "K0006": 40, "K0009": 255,
-}  # fmt: skip
-"""Characters that a field holds."""
-MOST = 255  # characters of a field that is not named there
 MISSING = 255
 SAME_PART = timedelta(hours=1)
 """Readings of a part further apart than this are of two measurements."""
@@ -177,14 +170,16 @@ class _Catalogue:
 
 
 class _Used:
-    """The catalogues of a file while it is written."""
+    """The catalogues of a file while it is written, by the field of a value that names their entries."""
 
     def __init__(self, given: Catalogues) -> None:
-        self.machines = _Catalogue(given.machines)
-        self.gauges = _Catalogue(given.gauges)
-        self.operators = _Catalogue((name, name) for name in given.operators)
-        self.events = _Catalogue(("", text) for text in given.events)
-        self.process = _Catalogue(("", text) for text in given.process)
+        self.of = {
+            "K0010": _Catalogue(given.machines),
+            "K0012": _Catalogue(given.gauges),
+            "K0008": _Catalogue((name, name) for name in given.operators),
+            "K0005": _Catalogue(("", text) for text in given.events),
+            "K0011": _Catalogue(("", text) for text in given.process),
+        }
 
 
 def _settle_encoding(path: Path) -> None:
@@ -214,7 +209,7 @@ class _Texts:
 
     def fit(self, key: str, text: str) -> str:
         plain = _SIGNS.sub(lambda signs: "," if signs[0] == ";" else " ", text).strip()
-        most = LENGTHS.get(key, MOST)
+        most = most_of(key)
         short = plain[:most].rstrip()
         if short != text.strip() and (key, text) not in self._told and len(self._told) < 100:
             self._told.add((key, text))
@@ -240,49 +235,48 @@ class _Header(_Texts):
             for index, described in enumerate(characteristics, 1):
                 if described.part == number - 1:
                     yield from self._characteristic(index, described, taken, catalogues)
-        yield from self._catalogue("K4060", "machines", ("K4062", "K4063"), catalogues.machines.entries)
-        yield from self._catalogue("K4070", "gauges", ("K4072", "K4073"), catalogues.gauges.entries)
-        yield from self._catalogue("K4090", "operators", ("K4092", "K4093"), catalogues.operators.entries)
-        yield from self._catalogue("K4220", "events", ("K4222", "K4223"), catalogues.events.entries)
-        yield from self._catalogue("K4240", "process parameters", ("K4242", "K4243"), catalogues.process.entries)
+        for of_value, catalogue in CATALOGUES.items():
+            yield from self._catalogue(catalogue, catalogues.of[of_value].entries)
 
     def _characteristic(self, index: int, described: Described, taken: set[str], catalogues: _Used) -> Iterator[str]:
         number = self.fit("K2001", described.number)
         for other in range(2, len(taken) + 3):  # two that were cut to the same
             if number not in taken:
                 break
-            number = f"{described.number[: LENGTHS['K2001'] - 4]}~{other}"
+            number = f"{described.number[: most_of('K2001') - 4]}~{other}"
         taken.add(number)
-        yield f"K2001/{index} {number}"
-        yield f"K2002/{index} {self.fit('K2002', described.name)}"
-        yield f"K2004/{index} 0"
-        if described.importance is not None:
-            yield f"K2005/{index} {described.importance}"
-        yield f"K2022/{index} {described.decimals}"
-        if catalogues.events.entries:
-            yield f"K2060/{index} 1"
-        if catalogues.process.entries:
-            yield f"K2061/{index} 1"
-        for key, value in (("K2101", described.nominal), ("K2110", described.lower), ("K2111", described.upper)):
+        nominal, lower, upper = described.nominal, described.lower, described.upper
+        off = [
+            None if nominal is None or limit is None else plain_number(round(limit - nominal, 9))
+            for limit in (lower, upper)
+        ]
+        fields = {
+            "K2001": number,
+            "K2002": self.fit("K2002", described.name),
+            "K2004": 0,
+            "K2005": described.importance,
+            "K2022": described.decimals,
+            "K2060": 1 if catalogues.of["K0005"].entries else None,
+            "K2061": 1 if catalogues.of["K0011"].entries else None,
+            "K2101": None if nominal is None else plain_number(nominal),
+            "K2110": None if lower is None else plain_number(lower),
+            "K2111": None if upper is None else plain_number(upper),
+            "K2112": off[0],
+            "K2113": off[1],
+            "K2120": described.kind_of(NaturalLimit.LOWER).value,
+            "K2121": described.kind_of(NaturalLimit.UPPER).value,
+            "K2142": self.fit("K2142", described.unit),
+            "K2402": self.fit("K2402", described.gauge) if described.gauge else None,
+        }
+        for key, value in fields.items():
             if value is not None:
-                yield f"{key}/{index} {plain_number(value)}"
-        if described.nominal is not None:
-            for key, value in (("K2112", described.lower), ("K2113", described.upper)):
-                if value is not None:
-                    yield f"{key}/{index} {plain_number(round(value - described.nominal, 9))}"
-        yield f"K2120/{index} {described.kind_of(NaturalLimit.LOWER).value}"
-        yield f"K2121/{index} {described.kind_of(NaturalLimit.UPPER).value}"
-        yield f"K2142/{index} {self.fit('K2142', described.unit)}"
-        if described.gauge:
-            yield f"K2402/{index} {self.fit('K2402', described.gauge)}"
+                yield f"{key}/{index} {value}"
 
-    def _catalogue(
-        self, key: str, name: str, fields: tuple[str, str], entries: Sequence[tuple[str, str]]
-    ) -> Iterator[str]:
+    def _catalogue(self, catalogue: Catalogue, entries: Sequence[tuple[str, str]]) -> Iterator[str]:
         if entries:
-            yield f"{key}/1 Inband {name}"
+            yield f"{catalogue.key}/1 Inband {catalogue.name}"
         for number, texts in enumerate(entries, 1):
-            for one, text in zip(fields, texts, strict=True):
+            for one, text in zip((catalogue.short, catalogue.long), texts, strict=True):
                 yield f"{one}/{number} {self.fit(one, text or str(number))}"
 
 
@@ -354,21 +348,22 @@ class _Values(_Texts):
                     yield f"{key}/{at + 1} {fitted}"
 
     def _portion(self, value: Written) -> str:
-        names = self._catalogues
+        names = self._catalogues.of
+        parameter = names["K0011"].number
         process = ",".join(
-            f"{names.process.number(name, both=False)}/{plain_number(number)}" for name, number in value.process.items()
+            f"{parameter(name, both=False)}/{plain_number(number)}" for name, number in value.process.items()
         )
         cells = [
             plain_number(value.measured),
             str(int(value.validity)),
             value.at.strftime("%d.%m.%Y/%H:%M:%S"),
-            ",".join(str(names.events.number(text, both=False)) for text in value.events),
+            ",".join(str(names["K0005"].number(text, both=False)) for text in value.events),
             f"#{self.fit('K0006', value.batch)}" if value.batch or self._batch else "",
             str(value.nest),
-            str(names.operators.number(value.operator)),
-            str(names.machines.number(value.machine)),
+            str(names["K0008"].number(value.operator)),
+            str(names["K0010"].number(value.machine)),
             process,
-            str(names.gauges.number(value.gauge)),
+            str(names["K0012"].number(value.gauge)),
         ]
         self._batch = self._batch or bool(value.batch)
         # What is not said holds on from the value before: a field that was filled once is always written from then on.

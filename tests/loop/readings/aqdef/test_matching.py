@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 
-from app.loop.readings.importing.aqdef.matching import Content, guessed, key_for, named
+from app.loop.readings.aqdef.matching import Content, guessed, key_for, named
 
 MANY = 6_000
 MOST = 3.0  # s of a processor, ten times what is needed; what grows with the square takes minutes

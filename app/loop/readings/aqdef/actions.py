@@ -13,7 +13,7 @@ from sqlalchemy.orm import Session
 from app.db.engine import Database
 from app.errors import FieldError, InbandError, Invalid
 from app.files.apart import apart
-from app.files.formats.aqdef import Description, Source
+from app.files.aqdef.description import Description, Source
 from app.files.formats.cell_values import folded
 from app.files.formats.delimited import Unusable
 from app.files.formats.repeats import once
@@ -23,11 +23,11 @@ from app.loop.characteristics import queries as characteristic_queries
 from app.loop.machines import queries as machines
 from app.loop.readings import queries
 from app.loop.readings.actions import exclude_all
-from app.loop.readings.importing.aqdef import matching
-from app.loop.readings.importing.aqdef.content import Readings, put_down
-from app.loop.readings.importing.aqdef.matching import NEW, Content
-from app.loop.readings.importing.aqdef.queries import count_alike, remembered
-from app.loop.readings.importing.aqdef.sorting import Wishes, described
+from app.loop.readings.aqdef import matching
+from app.loop.readings.aqdef.content import Readings, put_down
+from app.loop.readings.aqdef.matching import NEW, Content
+from app.loop.readings.aqdef.queries import count_alike, remembered
+from app.loop.readings.aqdef.sorting import Wishes, described
 from app.loop.readings.importing.cells import Flaw
 from app.loop.readings.importing.history import Flawed, Summary, store_history
 from app.loop.readings.records import Entry

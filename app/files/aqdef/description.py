@@ -2,7 +2,7 @@
 
 A line is `Kxxxx/i value`: K1… belongs to a part, K2…, K3… and K8… to the characteristic i, K4… to catalogues, K51… to the tree, K0001 to
 K0099 to measured values. Without an index it is 1; index 0 is all. Values are in K lines, or in one line for all characteristics:
-`aqdef_values` takes both. A file is read twice, once for what it
+`values` takes both. A file is read twice, once for what it
 describes and once for its values, one line after the other: however long it is, little of it is in memory.
 Sources: the fields and catalogues as Hexagon lists them for *Q-DAS ASCII Transfer Format*, version 12; how files deviate
 from that is known from what public readers take.
@@ -13,10 +13,12 @@ import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import NamedTuple, TextIO
+from typing import TextIO
 
+from app.files.aqdef.fields import FIELDS
 from app.files.formats import delimited
 from app.files.formats.delimited import Unusable
+from app.files.formats.repeats import Remark
 from app.language.i18n import _
 
 ENDINGS = {".dfq", ".dfd", ".dfx"}
@@ -33,22 +35,6 @@ _BAD_INDEX = re.compile(r"[Kk]\d{4,5}/(\S*)", re.ASCII)
 _CONTROL = re.compile(r"[\x00-\x1f\x7f-\x9f]+")
 _WHO = {"K1001", "K2001", "K2002"}
 _FAMILIES = set("1234580")
-HIERARCHY = {"K5102", "K5103", "K5111", "K5112"}
-"""The file's tree by the numbers of nodes: characteristics and nodes below one, the part and the characteristic that it is."""
-
-
-class Remark(NamedTuple):
-    """Something about a line that a person should know. wrong: its value cannot be taken; else it is only said."""
-
-    line: int
-    field: str
-    value: str
-    reason: str
-    wrong: bool = False
-
-    def __str__(self) -> str:
-        where = _("line {line}").format(line=self.line) + (f", {self.field}" if self.field else "")
-        return f"{where}: {f'{self.value!r} ' if self.value else ''}{self.reason}"
 
 
 @dataclass
@@ -246,7 +232,7 @@ class _Describing:
             self._of_characteristic(number, key, index, value)
         elif family == "4":
             self.found.catalogues.setdefault(key, {})[index] = value
-        elif key in HIERARCHY:
+        elif key.startswith("K51") and key in FIELDS:
             if (node := _count(value)) is not None:
                 self._nodes.setdefault(key, {}).setdefault(index, []).append(node)
         elif key == "K0100":

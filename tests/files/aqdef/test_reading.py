@@ -8,13 +8,15 @@ from zoneinfo import ZoneInfo
 
 import pytest
 
-from app.files.formats import aqdef, aqdef_values
-from app.files.formats.aqdef import Remark, Source
-from app.files.formats.aqdef_context import context_of
-from app.files.formats.aqdef_times import WallClock, time_of
-from app.files.formats.aqdef_values import Measured, Value
+from app.files.aqdef import description as aqdef
+from app.files.aqdef import values as aqdef_values
+from app.files.aqdef.context import context_of
+from app.files.aqdef.description import Source
+from app.files.aqdef.times import WallClock, time_of
+from app.files.aqdef.values import Measured, Value
 from app.files.formats.cell_values import Unreadable
 from app.files.formats.delimited import Unusable
+from app.files.formats.repeats import Remark
 
 F, C = aqdef_values.OF_FIELD, aqdef_values.OF_CHARACTERISTIC
 HEAD = ["K0100 2", "K1001 08/15", "K2001/1 D40", "K2002/1 Seat", "K2001/2 L12", "K2002/2 Length"]

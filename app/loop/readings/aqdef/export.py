@@ -18,8 +18,9 @@ from app.core.decision.step import Code
 from app.core.parameters import Parameters
 from app.core.period import ALWAYS, Period
 from app.errors import Invalid, NotFound
-from app.files.formats.aqdef_context import TEMPERATURES
-from app.files.formats.aqdef_writer import Catalogues, Described, Outcome, Part, Validity, Written, write
+from app.files.aqdef.context import TEMPERATURES
+from app.files.aqdef.fields import OF_VALUES
+from app.files.aqdef.writer import Catalogues, Described, Outcome, Part, Validity, Written, write
 from app.language.i18n import _
 from app.language.times import plant_zone
 from app.loop.characteristics import queries as characteristics
@@ -43,8 +44,8 @@ PROCESS = (IN_EFFECT, NUMBER, EMPIRICAL)
 """K0011: the location's offset where it is known, the last correction in effect, and what was taken off the measured size."""
 NO_SIZE = {Code.TOUCH_FAULT, Code.FIRST_MOVE_TRIGGERED}
 """Readings whose touches cannot be believed: what stands as their size was not measured."""
-OF_THE_READING = {"K0001", "K0002", "K0004", "K0014", "K0053", GUID}
-"""Fields that the reading itself fills. One that a sender put beside it would be another value, or another time or part."""
+OF_THE_READING = {key for key, field in OF_VALUES.items() if field.ours}
+"""One that a sender put beside it would be another value, or another time or part."""
 
 
 class _Of(NamedTuple):

@@ -1,43 +1,31 @@
-"""The values of AQDEF files, one after the other: out of K lines, or out of lines that hold one of every characteristic.
+"""The values of AQDEF files, one after the other, and their keys: out of K lines, or out of lines that hold one of every characteristic.
 
-In such a line characteristics are parted by the character 15 and the fields of a value (`FIELDS`) by the character 20.
+In such a line characteristics are parted by the character 15 and the fields of a value (`ROW`) by the character 20.
 """
 
+import hashlib
 import re
+from collections import Counter
 from collections.abc import Iterator
 from datetime import datetime
 from typing import NamedTuple
 
 from app.core.number_text import NotANumber, read_number
-from app.files.formats import aqdef
-from app.files.formats.aqdef import LINE, Description, Remark, Source, encoding_of, open_text
-from app.files.formats.aqdef_times import time_of
+from app.files.aqdef import description as aqdef
+from app.files.aqdef.description import LINE, Description, Source, encoding_of, open_text
+from app.files.aqdef.fields import FIELDS, OF_VALUES, ROW
+from app.files.aqdef.times import time_of
 from app.files.formats.cell_values import DayOrder, Unreadable
 from app.files.formats.delimited import Unusable
+from app.files.formats.repeats import Remark
 from app.language.i18n import _
 
 OF_CHARACTERISTIC, OF_FIELD = aqdef.OF_CHARACTERISTIC, "\x14"
 SHOWN_CHARACTERISTIC, SHOWN_FIELD = "¤☼", "¶"
 """The signs by which manuals and editors show these two; a file that went through one has them in their place."""
-FIELDS = ("K0001", "K0002", "K0004", "K0005", "K0006", "K0007", "K0008", "K0010", "K0011", "K0012")
 COUNTED = ("K0020", "K0021", "")
 """What stands before the attribute in place of the value where parts are counted, not measured."""
-HELD = {"K0004", "K0006", "K0007", "K0008", "K0010", "K0012"}
-"""Fields that hold on in a line for all characteristics, and below it, until another value is said."""
-VALUE_FIELDS = {
-    *FIELDS,
-    "K0009",
-    "K0014",
-    "K0015",
-    "K0016",
-    "K0017",
-    "K0020",
-    "K0021",
-    "K0053",
-    "K0080",
-    "K0081",
-    "K0097",
-} | {f"K00{number}" for number in range(54, 64)}
+_WHO = ("K0014", "K0006", "K0053", "K0007")
 _VALUE_ITSELF = {"K0001", "K0002", "K0020"}
 NO_VALUE = {255, 256}
 """K0002: missing, deleted. Any other than 0: there, but not to be evaluated."""
@@ -221,7 +209,7 @@ class _Reading:
                 yield self._nobody(number, index, portion.split(OF_FIELD)[0])
                 continue
             cells = [cell.strip() for cell in portion.rstrip(" \t" + OF_FIELD).split(OF_FIELD)]
-            names = COUNTED + FIELDS[1:] if _counts(characteristic, cells) else FIELDS
+            names = COUNTED + ROW[1:] if _counts(characteristic, cells) else ROW
             if len(cells) > len(names) and not self._longer:
                 self._longer = True
                 shown = portion[:40].replace(OF_FIELD, "|")
@@ -230,7 +218,7 @@ class _Reading:
             fields = {name: cell for name, cell in zip(names, cells, strict=False) if name and cell}
             if "K0006" in fields:
                 fields["K0006"] = fields["K0006"].removeprefix("#")
-            self._held |= {name: cell for name, cell in fields.items() if name in HELD}
+            self._held |= {name: cell for name, cell in fields.items() if FIELDS[name].holds}
             self._begun[index] = self._rows
             own = above | ahead[index].fields if index in ahead else above
             self._open[index] = Value(index, number, self._with_own(index, self._rows, self._held | own | fields))
@@ -253,7 +241,7 @@ class _Reading:
         if match[3] == "":
             reason = _("has a second stroke, but no number of a value behind it; it is taken for {key}/{index}")
             yield Remark(number, f"{key}/{index}/", value[:40], reason.format(key=key, index=index))
-        if key not in VALUE_FIELDS:
+        if key not in OF_VALUES:
             yield Remark(number, key, value[:40], _("is no field that is known here; it is kept and not used"))
         if key == "K0006":
             value = value.removeprefix("#")
@@ -375,7 +363,7 @@ def _counts(characteristic: aqdef.Characteristic, cells: list[str]) -> bool:
     """Tell if a row counts parts: K2004 says so; where it is missing, the place of the time does."""
     if "K2004" in characteristic.fields:
         return characteristic.counts
-    time_of_size, time_of_count = (FIELDS.index("K0004") + shift for shift in (0, len(COUNTED) - 1))
+    time_of_size, time_of_count = (ROW.index("K0004") + shift for shift in (0, len(COUNTED) - 1))
     return (
         len(cells) > time_of_count
         and _CLOCK.search(cells[time_of_count]) is not None
@@ -433,3 +421,24 @@ def _whole(text: str) -> int:
     if value != int(value):
         raise Unreadable(_("is not a whole number"))
     return int(value)
+
+
+class Keys:
+    """The keys of the values of one file: the same value has the same one, in whatever file and however written it comes. Values that are alike in everything are counted, wherever in the file they stand."""
+
+    def __init__(self) -> None:
+        self._seen: set[int] = set()  # 8 bytes of each name: a file has millions
+        self._again: Counter[int] = Counter()
+
+    def of(self, value: Value, identity: tuple[str, str, str], measured: float, at: datetime) -> str:
+        """The key of a value. identity: part, number and name of its characteristic. measured: mm. at: as the file has it."""
+        fields = {name: value.fields.get(name, "") for name in _WHO}
+        if not fields["K0007"].strip("0"):  # some programs write every field, others none that says nothing
+            fields["K0007"] = ""
+        text = "|".join([*identity, repr(round(measured, 9)), at.isoformat(), *fields.values()])
+        name = hashlib.blake2b(text.encode(), digest_size=10)
+        short = int.from_bytes(name.digest()[:8])
+        if short in self._seen:
+            self._again[short] += 1
+        self._seen.add(short)
+        return f"aqdef:{name.hexdigest()}:{self._again[short] + 1}"

@@ -6,18 +6,18 @@ from functools import cached_property
 
 from app.db.engine import Database
 from app.errors import InbandError
+from app.files.aqdef.description import Description, Source
 from app.files.formats import cell_values
-from app.files.formats.aqdef import Description, Source
 from app.files.formats.cell_values import DayOrder, Unreadable
 from app.files.formats.delimited import ENCODINGS
 from app.files.formats.units import LENGTHS
 from app.language.times import plant_zone
 from app.loop.characteristics import queries as characteristics
 from app.loop.machines import queries as machines
-from app.loop.readings.importing.aqdef import actions, matching
-from app.loop.readings.importing.aqdef.actions import Outcome, Result
-from app.loop.readings.importing.aqdef.matching import NEW, Content
-from app.loop.readings.importing.aqdef.sorting import Wishes
+from app.loop.readings.aqdef import actions, matching
+from app.loop.readings.aqdef.actions import Outcome, Result
+from app.loop.readings.aqdef.matching import NEW, Content
+from app.loop.readings.aqdef.sorting import Wishes
 from app.loop.readings.importing.cells import Flaw
 from app.loop.readings.importing.history import Flawed
 from app.loop.readings.importing.layout import wrong

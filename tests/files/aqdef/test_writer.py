@@ -11,10 +11,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from app.core.natural import NaturalLimit
-from app.files.formats import aqdef, aqdef_values
-from app.files.formats.aqdef import Source
-from app.files.formats.aqdef_values import Measured, Value
-from app.files.formats.aqdef_writer import MISSING, Catalogues, Described, Part, Validity, Written, write
+from app.files.aqdef import description as aqdef
+from app.files.aqdef import values as aqdef_values
+from app.files.aqdef.description import Source
+from app.files.aqdef.values import Measured, Value
+from app.files.aqdef.writer import MISSING, Catalogues, Described, Part, Validity, Written, write
 from tests.chance import examples
 
 BEGIN = datetime(2026, 11, 23, 6, 0, 0)

@@ -8,8 +8,8 @@ from typing import Any
 from app.core.natural import NaturalLimit, looks_natural, target_of
 from app.core.parameters import Parameters, cautious
 from app.core.plausibility import INCH, inch_warnings, looks_like_inches
-from app.files.formats.aqdef import LONGEST, Characteristic, Description
-from app.files.formats.aqdef_values import number_of
+from app.files.aqdef.description import LONGEST, Characteristic, Description
+from app.files.aqdef.values import number_of
 from app.files.formats.cell_values import Unreadable, folded
 from app.files.formats.units import LENGTHS, length_unit
 from app.language.i18n import _
@@ -80,18 +80,14 @@ class Content:
         return self.natural_limit
 
 
-@dataclass
-class _Said:
-    remarks: list[str] = field(default_factory=list)
-
-
 def contents(description: Description, unit: str | None = None) -> list[Content]:
     """Every characteristic of the file. unit: of lengths for which it names none."""
     return [_content(description, each, unit) for each in description.characteristics.values()]
 
 
 def _content(description: Description, each: Characteristic, unit: str | None) -> Content:
-    part, said = description.part_of(each), _Said()
+    part = description.part_of(each)
+    said: list[str] = []
     word = each.fields.get("K2142", "")
     own_unit, obstacle = _unit(word, unit, said)
     if each.counts:
@@ -111,7 +107,7 @@ def _content(description: Description, each: Characteristic, unit: str | None) -
         upper,
         obstacle,
         "" if obstacle else not_new(nominal, lower, upper),
-        tuple(said.remarks),
+        tuple(said),
         machine,
         None if obstacle else natural,
         each.lines.get("K2004" if each.counts else "K2142" if obstacle else "", min(each.lines.values(), default=0)),
@@ -122,23 +118,23 @@ def _only(entries: Mapping[int, str]) -> str:
     return next(iter(entries.values())) if len(entries) == 1 else ""
 
 
-def _unit(word: str, said_unit: str | None, said: _Said) -> tuple[str, str]:
+def _unit(word: str, said_unit: str | None, said: list[str]) -> tuple[str, str]:
     """Return the unit and why it cannot be used. Only what the file does not say is taken from elsewhere."""
     if word.strip():
         known = length_unit(word)
         if known is None:
             return "mm", _("is not a length: its unit is {unit} (K2142)").format(unit=repr(word))
         if known not in {"mm", "um"}:
-            said.remarks.append(
-                _("its unit is {unit} (K2142): values and limits are converted to mm").format(unit=known)
-            )
+            said.append(_("its unit is {unit} (K2142): values and limits are converted to mm").format(unit=known))
         return known, ""
     if said_unit is None:
-        said.remarks.append(_("the file names no unit (K2142): taken for mm"))
+        said.append(_("the file names no unit (K2142): taken for mm"))
     return said_unit or "mm", ""
 
 
-def _limits(fields: Mapping[str, str], scale: float, said: _Said) -> tuple[float | None, float | None, float | None]:
+def _limits(
+    fields: Mapping[str, str], scale: float, said: list[str]
+) -> tuple[float | None, float | None, float | None]:
     """Nominal size, lower and upper limit, mm."""
 
     def length(key: str) -> float | None:
@@ -148,7 +144,7 @@ def _limits(fields: Mapping[str, str], scale: float, said: _Said) -> tuple[float
         try:
             return round(number_of(text) * scale, 9)
         except Unreadable as error:
-            said.remarks.append(f"{key}: {text!r} {error}")
+            said.append(f"{key}: {text!r} {error}")
             return None
 
     nominal = length("K2101")
@@ -156,34 +152,32 @@ def _limits(fields: Mapping[str, str], scale: float, said: _Said) -> tuple[float
     for limit, deviation, kind in (("K2110", "K2112", "K2120"), ("K2111", "K2113", "K2121")):
         value, off = length(limit), length(deviation)
         if value is None and off is not None and nominal is None:
-            said.remarks.append(
+            said.append(
                 _("{deviation} is an offset from a nominal size (K2101), which is missing").format(deviation=deviation)
             )
         if value is None and off is not None and nominal is not None:
             value = round(nominal + off, 9)
         elif value is not None and off is not None and nominal is not None and abs(nominal + off - value) > SLACK:
-            said.remarks.append(
+            said.append(
                 _("{limit} and {deviation} do not agree; {limit} counts").format(limit=limit, deviation=deviation)
             )
         if value is not None and fields.get(kind) == "0":
-            said.remarks.append(
+            said.append(
                 _("{kind} = 0 says that there is no limit, {limit} names one; it counts").format(kind=kind, limit=limit)
             )
         found.append(value)
     lower, upper = found
     if lower is None and upper is not None and (fields.get("K2120") == NATURAL or not nominal):
         lower = 0.0
-        said.remarks.append(_("no lower limit: a form error, which is never below 0"))
+        said.append(_("no lower limit: a form error, which is never below 0"))
     return nominal, lower, upper
 
 
-def _natural(fields: Mapping[str, str], name: str, nominal: float | None, said: _Said) -> NaturalLimit | None:
+def _natural(fields: Mapping[str, str], name: str, nominal: float | None, said: list[str]) -> NaturalLimit | None:
     """The limit that the file calls natural (K2120, K2121 = 2); an ordinary lower one of a form error is not believed."""
     lower, upper = (fields.get(key, "").strip() == NATURAL for key in ("K2120", "K2121"))
     if lower and upper:
-        said.remarks.append(
-            _("both limits are natural ones (K2120, K2121 = 2), so nothing would be judged: both are judged")
-        )
+        said.append(_("both limits are natural ones (K2120, K2121 = 2), so nothing would be judged: both are judged"))
         return NaturalLimit.NONE
     if lower or upper:
         return NaturalLimit.LOWER if lower else NaturalLimit.UPPER

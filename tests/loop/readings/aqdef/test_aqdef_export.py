@@ -7,10 +7,11 @@ import pytest
 from sqlalchemy import text
 
 from app.db.engine import Database
-from app.files.formats import aqdef, aqdef_values
-from app.files.formats.aqdef import Source
-from app.files.formats.aqdef_values import OF_FIELD as F
-from app.files.formats.aqdef_values import Measured, Value
+from app.files.aqdef import description as aqdef
+from app.files.aqdef import values as aqdef_values
+from app.files.aqdef.description import Source
+from app.files.aqdef.values import OF_FIELD as F
+from app.files.aqdef.values import Measured, Value
 from app.loop.readings import queries
 from app.loop.readings.actions import exclude
 from tests.conftest import Server
