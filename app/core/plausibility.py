@@ -105,15 +105,21 @@ def offset_warnings(before: float, after: float) -> list[CodedWarning]:
     return [CodedWarning("offset_step", values, "offset")] if step > OFFSET_STEP else []
 
 
-def empirical_value_warnings(value: float) -> list[CodedWarning]:
-    """Return the warning of an empirical value that no probe has, mm.
+def empirical_value_warnings(value: float, before: float = 0.0, half: float | None = None) -> list[CodedWarning]:
+    """Return the warning of an empirical value that no probe has, or that moves every size out of its tolerance, mm.
 
-    >>> [each.field for each in empirical_value_warnings(2.6)]
-    ['empirical_value']
+    before: the value until now; half: distance from the target to the limits of the tightest characteristic at this place.
+
+    >>> [each.code for each in empirical_value_warnings(2.6)], empirical_value_warnings(0.4)
+    (['empirical_value_large'], [])
+    >>> [each.code for each in empirical_value_warnings(0.4, 0.002, half=0.02)], empirical_value_warnings(0.41, 0.4, half=0.02)
+    (['empirical_value_step'], [])
     """
-    if abs(value) <= EMPIRICAL_VALUE:
+    if abs(value) > EMPIRICAL_VALUE:
+        return [CodedWarning("empirical_value_large", {"value": value, "limit": EMPIRICAL_VALUE}, "empirical_value")]
+    if half is None or nanometres(abs(value - before)) <= nanometres(half):
         return []
-    return [CodedWarning("empirical_value_large", {"value": value, "limit": EMPIRICAL_VALUE}, "empirical_value")]
+    return [CodedWarning("empirical_value_step", {"before": before, "after": value, "limit": half}, "empirical_value")]
 
 
 def is_jump(now: float, level: float | None, allowed: float) -> bool:

@@ -15,6 +15,8 @@ from app.access.audit.actions import record
 from app.access.callers import Caller
 from app.core.decision.limits import Zone, nanometres
 from app.core.decision.step import rounded
+from app.core.plausibility import empirical_value_warnings
+from app.core.warning import CodedWarning
 from app.db.events import publish
 from app.errors import Conflict
 from app.language.i18n import _
@@ -196,11 +198,11 @@ def _set_offset(
 
 def set_empirical_value(
     session: Session, machine: Machine, location: int, empirical_value: float, reason: str, caller: Caller
-) -> AverageMemory:
+) -> list[CodedWarning]:
     """Set what is taken off every measurement by the characteristics that use this location (R11); M begins again at 0.
 
     Another one than before supersedes the open corrections of these characteristics: what the probe read too much is in them.
-    Raises `NotFound`.
+    What may be wrong with it is returned. Raises `NotFound`.
     """
     lock_machines(session, [machine.id])
     now = datetime.now(UTC)
@@ -228,7 +230,8 @@ def set_empirical_value(
         average_changed(machine, location),
         *(correction_changed(session, machine, correction) for correction in fallen),
     )
-    return memory
+    half = queries.tightest_half(session, machine, location)
+    return empirical_value_warnings(memory.empirical_value, before["empirical_value"], half)
 
 
 def resume_tools(session: Session, machine: Machine, alarm: int) -> list[int]:

@@ -6,7 +6,7 @@ from fastapi import Path, Query, Response
 
 from app.access.deps import AnyCaller, Operator, OperatorOrMachine
 from app.core.parameters import MOST_LOCATIONS
-from app.core.plausibility import empirical_value_warnings, offset_warnings
+from app.core.plausibility import offset_warnings
 from app.loop.machines.queries import hold_machine, machine_for, machine_named
 from app.loop.timeline.figures import MANUAL_EDIT, TOOL_CHANGE
 from app.loop.timeline.queries import with_events_of_machine
@@ -186,8 +186,7 @@ def set_empirical_value(
     with it, and the next readings decide again.
     """
     machine_row = machine_for(session, caller, machine, "operator")
-    actions.set_empirical_value(session, machine_row, location, value.empirical_value, value.reason, caller)
-    warnings = empirical_value_warnings(value.empirical_value)
+    warnings = actions.set_empirical_value(session, machine_row, location, value.empirical_value, value.reason, caller)
     return average_set(queries.averages(session, machine_row, only=location)[0], machine_row.key, warnings)
 
 

@@ -13,6 +13,7 @@ from app.core.parameters import MOST_LOCATIONS
 from app.errors import NotFound
 from app.language.i18n import _
 from app.loop.characteristics.correction_queries import open_corrections
+from app.loop.characteristics.queries import characteristics
 from app.loop.readings import queries as readings
 from app.loop.tables.characteristics import Characteristic
 from app.loop.tables.machines import Machine
@@ -195,6 +196,16 @@ def averages(
         sharing[location].append(key)
     rows = session.scalars(query.execution_options(populate_existing=True))
     return [AverageRow(row, sharing[row.location]) for row in rows]
+
+
+def tightest_half(session: Session, machine: Machine, location: int) -> float | None:
+    """The least distance from a target to its limits of the characteristics that use this location R11, mm; None without one."""
+    halves = [
+        each.parameters.half
+        for each in characteristics(session, machine_id=machine.id)
+        if each.parameters.average_memory == location
+    ]
+    return min(halves, default=None)
 
 
 def counting_on(session: Session, machine: Machine, correction: Correction) -> list[int]:

@@ -7,7 +7,7 @@ from typing import Any
 from sqlalchemy.orm import Session
 
 from app.access.callers import Caller
-from app.core.plausibility import empirical_value_warnings, offset_warnings
+from app.core.plausibility import offset_warnings
 from app.language.i18n import _, ngettext
 from app.language.numbers import mm, read_um, typed_length, um
 from app.loop.characteristics.correction_queries import open_corrections
@@ -331,8 +331,10 @@ def _computed_with_it(on: OfAverage) -> list[str]:
 
 
 def _set_empirical_value(on: OfAverage, value: EmpiricalValueIn) -> Said:
-    actions.set_empirical_value(on.session, on.machine, on.number, value.empirical_value, value.reason, on.caller)
-    return Said("average-large" if empirical_value_warnings(value.empirical_value) else "average", on.number)
+    warnings = actions.set_empirical_value(
+        on.session, on.machine, on.number, value.empirical_value, value.reason, on.caller
+    )
+    return Said(warnings[0].code.replace("empirical_value", "average") if warnings else "average", on.number)
 
 
 AVERAGE: tuple[Verb[OfAverage, Any], ...] = (
@@ -382,6 +384,10 @@ def done(code: str, number: int) -> str | None:
         "average": AVERAGE[0].said(),
         "average-large": _(
             "The empirical value of R11 = {n} is set to more than 1 mm: no probe measures so far off. Is it µm?"
+        ),
+        "average-step": _(
+            "The empirical value of R11 = {n} is set, more than a tolerance from the one before: the next reading asks for that. Is it "
+            "µm?"
         ),
     }
     return said((*CORRECTION, *TOOL), code, number, more)

@@ -5,7 +5,7 @@ from typing import Any
 
 from app.core.warning import CodedWarning
 from app.language.i18n import _
-from app.language.numbers import mm, signed, um
+from app.language.numbers import PLUS_MINUS, mm, signed, um
 
 
 def sentence(warning: CodedWarning) -> str:
@@ -105,6 +105,19 @@ def _empirical_value_large(values: dict[str, Any]) -> str:
     )
 
 
+def _empirical_value_step(values: dict[str, Any]) -> str:
+    return _(
+        "The empirical value was {before} and is {after} now: every size reads {change} from before, more than a tolerance of "
+        "{pm} {limit} there, and the next reading asks for that. Is it µm?"
+    ).format(
+        before=mm(values["before"]),
+        after=mm(values["after"]),
+        change=um(values["before"] - values["after"]),
+        pm=PLUS_MINUS,
+        limit=mm(values["limit"]),
+    )
+
+
 def _pair_apart(values: dict[str, Any]) -> str:
     return _("Machine and gauge differ by {off}; up to {limit} is plausible. Is it the same part?").format(
         off=mm(values["off"]), limit=_length(values["limit"])
@@ -115,6 +128,7 @@ _TEXTS = {
     "pair_apart": _pair_apart,
     "offset_step": _offset_step,
     "empirical_value_large": _empirical_value_large,
+    "empirical_value_step": _empirical_value_step,
     "turned_far": _turned_far,
     "shifted_far": _shifted_far,
     "touch_far_off": _touch_far_off,

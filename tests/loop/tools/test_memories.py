@@ -199,6 +199,10 @@ def test_an_offset_and_an_empirical_value_typed_in_micrometres_are_warned_of(sho
     told = shop.call("POST", f"{tool}/change", offset=400, reason="new insert")
     assert [(each["code"], each["field"]) for each in told["warnings"]] == [("offset_step", "offset")]
     assert shop.call("PUT", average, empirical_value=0.0026, reason="CMM")["warnings"] == []
+    (warned,) = shop.call("PUT", average, empirical_value=0.2, reason="CMM")["warnings"]
+    assert (warned["code"], warned["field"]) == ("empirical_value_step", "empirical_value")
+    assert "every size reads −197.4\u00a0µm from before, more than a tolerance of ± 0.0080\u00a0mm" in warned["text"]
+    assert shop.call("PUT", average, empirical_value=0.204, reason="CMM")["warnings"] == []
     assert (
         shop.call("PUT", average, empirical_value=2.6, reason="CMM")["warnings"][0]["code"] == "empirical_value_large"
     )
