@@ -14,7 +14,7 @@ import typer
 
 from app.cli import aqdef
 from app.cli.base import DatabaseUrl, DataDir, cli, existing, people, say, settings_from
-from app.errors import Invalid, NotFound
+from app.errors import Invalid
 from app.language.i18n import _, ngettext
 from app.language.times import MINUTES, in_zone, plant_zone, written
 
@@ -344,9 +344,7 @@ def export_file(
         existing(settings_from(data_dir=data_dir, database_url=database_url)) as database,
         database.begin() as session,
     ):
-        entry = queries.entry_of(session, characteristic)
-        if entry is None:
-            raise NotFound(_("There is no characteristic {key}.").format(key=repr(characteristic)))
+        entry = queries.entry_named(session, characteristic)
         ends = exporting.Ends()
         exported = ends.of(exporting.rows(session, entry, period=period, last=last))
         with _output(output) as target, in_zone(zone):

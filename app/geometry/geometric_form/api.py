@@ -1,6 +1,6 @@
 """JSON routes: form measurements, their pictures, their trend."""
 
-from typing import Annotated, Literal
+from typing import Annotated
 
 from fastapi import Path, Query, Response
 
@@ -9,9 +9,9 @@ from app.errors import NotFound
 from app.geometry.geometric_form import actions, figures, queries, wording
 from app.geometry.geometric_form.answers import FormOut, form_out
 from app.geometry.geometric_form.queries import FormRow
-from app.geometry.geometric_form.schemas import FormIn
+from app.geometry.geometric_form.schemas import FormIn, KindName
 from app.language.i18n import _
-from app.loop.machines.queries import machine_for, machine_keys_by_id, machine_named
+from app.loop.machines.queries import machine_for, only_machine
 from app.loop.timeline.queries import with_events_of_machine
 from app.web.api import (
     FIGURE,
@@ -31,16 +31,6 @@ from app.web.fields import Page, ReasonIn, Slug, page_of
 
 router = api_router("forms")
 Number = Annotated[int, Path(description="Number of the measurement.", examples=[17])]
-KindName = Literal[
-    "roundness",
-    "straightness",
-    "axis_straightness",
-    "flatness",
-    "coaxiality",
-    "position",
-    "parallelism",
-    "perpendicularity",
-]
 
 
 @router.post("/forms", status_code=201, responses=problems(404, 409) | sent_again(FormOut))
@@ -69,14 +59,8 @@ def list_forms(
     limit: Limit = 100,
 ) -> Page[FormOut]:
     """Form measurements, oldest first, with what counts of each."""
-    machine_row = machine_named(session, machine) if machine is not None else None
-    if machine_row is None and caller.machine_id is not None:
-        machine_row = machine_named(session, machine_keys_by_id(session)[caller.machine_id])
-    if machine_row is not None:
-        caller.must_at(machine_row.id, "viewer")
-    else:
-        caller.must("viewer")
-    rows = queries.forms(session, machine=machine_row, feature=feature, kind=kind, after=after, limit=limit + 1)
+    only = only_machine(session, caller, machine)
+    rows = queries.forms(session, machine_id=only, feature=feature, kind=kind, after=after, limit=limit + 1)
     readings = queries.became(session, rows)
     return page_of([form_out(row, readings.get(row.measurement.id)) for row in rows], limit, lambda form: form.id)
 

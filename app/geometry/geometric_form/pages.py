@@ -80,7 +80,13 @@ def feature_page(
     """The trend of a feature, and its measurements, newest first."""
     machine_row = machine_named(session, machine)
     rows = queries.forms(
-        session, machine=machine_row, feature=feature, kind=kind, before=before, newest_first=True, limit=ON_PAGE + 1
+        session,
+        machine_id=machine_row.id,
+        feature=feature,
+        kind=kind,
+        before=before,
+        newest_first=True,
+        limit=ON_PAGE + 1,
     )
     if not rows and before is None:
         raise NotFound(

@@ -79,7 +79,7 @@ def by_key(session: Session, machine_id: int, key: str) -> FormRow | None:
 def forms(
     session: Session,
     *,
-    machine: Machine | None = None,
+    machine_id: int | None = None,
     feature: str | None = None,
     kind: str | None = None,
     after: int = 0,
@@ -89,8 +89,8 @@ def forms(
 ) -> list[FormRow]:
     """Measurements, oldest first."""
     query = _rows().where(FormMeasurement.id > after).limit(limit)
-    if machine is not None:
-        query = query.where(FormMeasurement.machine_id == machine.id)
+    if machine_id is not None:
+        query = query.where(FormMeasurement.machine_id == machine_id)
     if feature is not None:
         query = query.where(FormMeasurement.feature == feature)
     if kind is not None:
@@ -103,7 +103,7 @@ def forms(
 
 def trend(session: Session, machine: Machine, feature: str, kind: str | None = None) -> list[FormRow]:
     """The last measurements of a feature in the order in which they were measured."""
-    rows = forms(session, machine=machine, feature=feature, kind=kind, newest_first=True, limit=SHOWN)
+    rows = forms(session, machine_id=machine.id, feature=feature, kind=kind, newest_first=True, limit=SHOWN)
     return sorted(rows, key=lambda row: (row.measurement.measured_at, row.measurement.id))
 
 

@@ -14,6 +14,16 @@ from app.web.fields import IN_UM, Body, LatelyOrNow, Length, RecordKey, Slug, Te
 MOST_TOUCHES = 2000
 MOST_SECTIONS = 200
 
+KindName = Literal[
+    "roundness",
+    "straightness",
+    "axis_straightness",
+    "flatness",
+    "coaxiality",
+    "position",
+    "parallelism",
+    "perpendicularity",
+]
 Positive = Annotated[float, Field(strict=True, gt=0, le=LARGEST_LENGTH, allow_inf_nan=False)]
 NotNegative = Annotated[float, Field(strict=True, ge=0, le=LARGEST_LENGTH, allow_inf_nan=False)]
 Flat = Annotated[list[Length], Field(min_length=2, max_length=2, examples=[[-6.096, 24.249]])]
@@ -65,19 +75,7 @@ class FormIn(Body):
 
     machine: Annotated[Slug, Field(description="The key of the machine.")]
     feature: Annotated[Slug, Field(description="A key of yours for what was touched: its measurements make a trend.")]
-    kind: Annotated[
-        Literal[
-            "roundness",
-            "straightness",
-            "axis_straightness",
-            "flatness",
-            "coaxiality",
-            "position",
-            "parallelism",
-            "perpendicularity",
-        ],
-        Field(description="What is looked at."),
-    ]
+    kind: Annotated[KindName, Field(description="What is looked at.")]
     method: Annotated[
         Literal["minimum_zone", "least_squares", "printed"] | None,
         Field(

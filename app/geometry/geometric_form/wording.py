@@ -4,6 +4,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from app.core.geometry.elements import WrongSection
+from app.core.geometry.form import FormKind
 from app.core.geometry.points import Degenerate, Reason
 from app.core.geometry.relations import DatumRefused
 from app.errors import FieldError, Invalid
@@ -27,19 +28,7 @@ def kind_word(kind: str) -> str:
 
 def kinds() -> list[tuple[str, str]]:
     """Every kind with its name."""
-    return [
-        (kind, kind_word(kind))
-        for kind in (
-            "roundness",
-            "straightness",
-            "axis_straightness",
-            "flatness",
-            "coaxiality",
-            "position",
-            "parallelism",
-            "perpendicularity",
-        )
-    ]
+    return [(kind.value, kind_word(kind)) for kind in FormKind]
 
 
 def method_word(method: str) -> str:

@@ -54,6 +54,17 @@ def entry_of(session: Session, characteristic: str) -> Entry | None:
     return Entry(*row) if row else None
 
 
+def entry_named(session: Session, characteristic: str) -> Entry:
+    """The place of the characteristic with this key. Raises `NotFound`."""
+    entry = entry_of(session, characteristic)
+    if entry is None:
+        raise NotFound(
+            _("There is no characteristic {key}.").format(key=repr(characteristic[:64])),
+            _("Check the key under Set-up; GET /api/v1/characteristics lists them all."),
+        )
+    return entry
+
+
 def entry_by_id(session: Session, machine_id: int, characteristic_id: int) -> Entry:
     """Return the place of a characteristic that is known to be there."""
     row = session.execute(
@@ -374,11 +385,6 @@ def reasons(
 
 def entry_for(session: Session, caller: Caller, characteristic: str) -> Entry:
     """The place of a characteristic, for somebody who may look at it. Raises `NotFound`, `NotAllowed`."""
-    entry = entry_of(session, characteristic)
-    if entry is None:
-        raise NotFound(
-            _("There is no characteristic %(key)s.") % {"key": characteristic},
-            _("Check the key; GET /api/v1/characteristics lists them all."),
-        )
+    entry = entry_named(session, characteristic)
     caller.must_at(entry.machine_id, "viewer")
     return entry

@@ -85,8 +85,7 @@ def decisions(
     context: Chosen = (),
 ) -> list[Decision]:
     """The decisions before a reading's number (or the last ones), newest first; only on readings of a context, if one is chosen."""
-    entry = readings.entry_of(session, current.characteristic.key)
-    assert entry is not None
+    entry = readings.entry_named(session, current.characteristic.key)
     of_those = [in_context(context)] if context else []
     answers = readings.answers(session, entry, readings.latest(session, entry, before, limit, *of_those))
     return _complete(session, current, entry, answers)
@@ -94,8 +93,7 @@ def decisions(
 
 def decision(session: Session, current: CurrentCharacteristic, sequence: int) -> Decision:
     """The decision on one reading. Raises `NotFound`."""
-    entry = readings.entry_of(session, current.characteristic.key)
-    assert entry is not None
+    entry = readings.entry_named(session, current.characteristic.key)
     (only,) = _complete(session, current, entry, [readings.detail(session, entry, sequence)])
     return only
 

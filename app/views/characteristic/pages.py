@@ -252,8 +252,7 @@ def send_measured_by_hand(
 ) -> Response:
     """Enter what was measured by hand on this part."""
     current = queries.characteristic_named(session, characteristic)
-    entry = reading_queries.entry_of(session, characteristic)
-    assert entry is not None
+    entry = reading_queries.entry_named(session, characteristic)
     try:
         measure_typed(session, entry, sequence, form, caller.name)
     except InbandError as error:
@@ -270,8 +269,7 @@ def send_exclusion(
 ) -> Response:
     """Take the reading out of the statistics."""
     current = queries.characteristic_named(session, characteristic)
-    entry = reading_queries.entry_of(session, characteristic)
-    assert entry is not None
+    entry = reading_queries.entry_named(session, characteristic)
     try:
         reason = checked(Reason, form.get("reason", ""), "reason")
         readings.exclude(session, entry, sequence, caller.name, reason)

@@ -216,9 +216,7 @@ def _store_all(
         key = set_up(session, content, machine, actor, taken) if created else chosen[index]
         taken.setdefault(key, 1)
         key = characteristic_queries.characteristic_named(session, key).characteristic.key
-        entry = queries.entry_of(session, key)
-        assert entry is not None
-        entries.append((entry, content, created))
+        entries.append((queries.entry_named(session, key), content, created))
     results = {}
     # In the order of the machines, as everybody takes their locks.
     for entry, content, created in sorted(entries, key=lambda each: each[0].machine_id):
@@ -298,8 +296,7 @@ def _exclude(
 def _remember(session: Session, results: Sequence[Result], actor: str) -> None:
     """Keep what belongs together, for the next file of the same part."""
     for each in results:
-        entry = queries.entry_of(session, each.key)
-        assert entry is not None
+        entry = queries.entry_named(session, each.key)
         part, number, name = each.content.identity
         values = {"part": part, "number": number, "name": name, "actor": actor, "at": datetime.now(UTC)}
         where = {"machine_id": entry.machine_id, "characteristic_id": entry.characteristic_id}

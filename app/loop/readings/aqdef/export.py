@@ -17,7 +17,7 @@ from app.core.decision.limits import Zone
 from app.core.decision.step import Code
 from app.core.parameters import Parameters
 from app.core.period import ALWAYS, Period
-from app.errors import Invalid, NotFound
+from app.errors import Invalid
 from app.files.aqdef.context import TEMPERATURES
 from app.files.aqdef.fields import OF_VALUES
 from app.files.aqdef.writer import Catalogues, Described, Outcome, Part, Validity, Written, write
@@ -119,9 +119,7 @@ def _decimals(parameters: Parameters) -> int:
 
 
 def _values(session: Session, of: _Of, *, period: Period, last: int | None) -> Iterator[Written]:
-    entry = queries.entry_of(session, of.current.characteristic.key)
-    if entry is None:
-        raise NotFound(_("There is no characteristic {key}.").format(key=repr(of.current.characteristic.key)))
+    entry = queries.entry_named(session, of.current.characteristic.key)
     zone, machine = plant_zone(), of.current.machine
     parameters = of.current.parameters
     changes = _changes(session, machine.id, parameters.tool_memory)

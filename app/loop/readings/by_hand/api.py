@@ -5,31 +5,17 @@ from typing import Annotated
 from fastapi import Path
 
 from app.access.deps import AnyCaller, Operator
-from app.errors import NotFound
-from app.language.i18n import _
 from app.loop.readings import queries as readings
 from app.loop.readings.by_hand import actions, queries
 from app.loop.readings.by_hand.actions import HandResult
 from app.loop.readings.by_hand.schemas import HandMeasurementIn, HandMeasurementOut
 from app.loop.readings.by_hand.wording import as_json
-from app.loop.readings.records import Entry
 from app.web.api import After, CharacteristicKey, Limit, api_router, problems
 from app.web.deps import SessionDep
 from app.web.fields import LARGEST_ID, Page, page_of
 
 router = api_router("readings")
 Sequence = Annotated[int, Path(ge=1, le=LARGEST_ID, description="Number of the reading: 1, 2, 3 … without gaps.")]
-
-
-def _entry(session: SessionDep, caller: AnyCaller, characteristic: str) -> Entry:
-    entry = readings.entry_of(session, characteristic)
-    if entry is None:
-        raise NotFound(
-            _("There is no characteristic %(key)s.") % {"key": characteristic[:64]},
-            _("Check the key; GET /api/v1/characteristics lists them all."),
-        )
-    caller.must_at(entry.machine_id, "viewer")
-    return entry
 
 
 @router.post("/readings/{characteristic}/{sequence}/by-hand", status_code=201, responses=problems(404))
@@ -41,7 +27,7 @@ def add_hand_measurement(
     given: HandMeasurementIn,
 ) -> HandMeasurementOut:
     """Enter what a person measured on this part. It is beside the machine's value; the decision stays as it was."""
-    entry = _entry(session, caller, characteristic)
+    entry = readings.entry_for(session, caller, characteristic)
     good = None if given.verdict is None else given.verdict == "good"
     measurement = actions.measure(
         session, entry, sequence, HandResult(given.measured, good, given.comment), caller.name
@@ -58,6 +44,6 @@ def list_hand_measurements(
     limit: Limit = 100,
 ) -> Page[HandMeasurementOut]:
     """All measurements by hand of a characteristic, in the order in which they were entered."""
-    entry = _entry(session, caller, characteristic)
+    entry = readings.entry_for(session, caller, characteristic)
     rows = queries.page(session, entry.machine_id, entry.characteristic_id, after, limit + 1)
     return page_of([HandMeasurementOut.model_validate(as_json(row)) for row in rows], limit, lambda row: row.id)

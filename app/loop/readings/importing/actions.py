@@ -5,7 +5,7 @@ from datetime import UTC, datetime
 from pathlib import Path
 
 from app.db.engine import Database
-from app.errors import Conflict, Invalid, NotFound
+from app.errors import Conflict, Invalid
 from app.language.i18n import _
 from app.loop.characteristics import queries as characteristics
 from app.loop.readings import queries
@@ -40,12 +40,7 @@ def import_readings(
     source: what the file is called in the record of changes. read: its lines, where they were read apart. Raises `NotFound`, `Flawed` and `Invalid`.
     """
     with database.sessions() as session:
-        entry = queries.entry_of(session, characteristic)
-        if entry is None:
-            raise NotFound(
-                _("There is no characteristic {key}.").format(key=repr(characteristic)),
-                _("Check its key under Set-up, or set it up first."),
-            )
+        entry = queries.entry_named(session, characteristic)
         current = characteristics.characteristic_named(session, characteristic)
         layout = layout if layout.only else layout.of_one(characteristic, current.characteristic.name)
         parsed_lines = lines(path, layout, characteristic) if read is None else read(0, characteristic)
