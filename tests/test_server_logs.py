@@ -7,7 +7,7 @@ import pytest
 from tests import server_logs
 
 
-def test_what_was_added_since_the_test_began_is_told(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_what_was_added_since_the_test_began_is_reported(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(server_logs, "_begins", {})
     old, quiet, new = (tmp_path / name for name in ("old", "quiet", "new"))
     old.write_text("before\n")

@@ -35,7 +35,7 @@ from app.charts.description import (
 from app.charts.palette import BANDS, PALETTES, Colour, Faded, Role, ThemeName
 from app.charts.paper import to_drawing
 from app.charts.plotly import to_plotly
-from app.charts.strata import look, told_apart
+from app.charts.strata import distinguished, look
 from app.charts.svg import svg
 
 __all__ = [
@@ -64,6 +64,7 @@ __all__ = [
     "ThemeName",
     "band",
     "bold",
+    "distinguished",
     "empty",
     "look",
     "nothing",
@@ -72,5 +73,4 @@ __all__ = [
     "time_axis",
     "to_drawing",
     "to_plotly",
-    "told_apart",
 ]

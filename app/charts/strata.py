@@ -30,7 +30,7 @@ def look(number: int) -> tuple[Colour, str]:
     return colour, LOOKS[(number + number // len(LOOKS)) % len(LOOKS)][1]
 
 
-def told_apart(chart: Chart, meta: str, labels: Sequence[int] | Mapping[Any, int], names: Sequence[str]) -> Chart:
+def distinguished(chart: Chart, meta: str, labels: Sequence[int] | Mapping[Any, int], names: Sequence[str]) -> Chart:
     """The chart with the points of the series `meta` in the look of their stratum, and the names of the strata in its legend.
 
     labels: the number of each point's name, negative for none; by the place of the point, or by its x.
@@ -38,7 +38,7 @@ def told_apart(chart: Chart, meta: str, labels: Sequence[int] | Mapping[Any, int
     panels = []
     for at, panel in enumerate(chart.panels):
         marks = [
-            _told_apart(mark, labels, names) if isinstance(mark, Series) and mark.meta == meta else mark
+            _distinguished(mark, labels, names) if isinstance(mark, Series) and mark.meta == meta else mark
             for mark in panel.marks
         ]
         if at == 0:
@@ -52,7 +52,7 @@ def _legend(number: int, name: str) -> Series:
     return Series([None], [None], dots=Dots(symbol, 9, colour, "surface"), meta="stratum", name=name)
 
 
-def _told_apart(drawn: Series, labels: Sequence[int] | Mapping[Any, int], names: Sequence[str]) -> Mark:
+def _distinguished(drawn: Series, labels: Sequence[int] | Mapping[Any, int], names: Sequence[str]) -> Mark:
     of = [labels.get(x, -1) for x in drawn.x] if isinstance(labels, Mapping) else list(labels)
     dots = drawn.dots or Dots(size=4)
     before = [dots.symbol] * len(of) if isinstance(dots.symbol, str) else dots.symbol

@@ -153,7 +153,7 @@ class Plants:
         self._served: dict[str, Served] = {}
         self._listed: Sequence[Plant] = []
         self._withheld: dict[str, str] = {}
-        self._told: dict[str, str] = {}
+        self._reported: dict[str, str] = {}
         self._outage = Outage(log, "looks at the list of plants")
         front.state.plants = self
         front.router.lifespan_context = self._lifespan
@@ -248,13 +248,13 @@ class Plants:
             self._tell(plant, error.errors()[0]["msg"])
             return
         served.begin()
-        self._told.pop(plant.key, None)
+        self._reported.pop(plant.key, None)
         log.info("plant %s is served at %s", plant.key, served.settings.address if plant.prefix else plant.host)
 
     def _tell(self, plant: Plant, why: str) -> None:
         """Log once why a plant is not served; the list is looked at every few seconds."""
-        if self._told.get(plant.key) != why:
-            self._told[plant.key] = why
+        if self._reported.get(plant.key) != why:
+            self._reported[plant.key] = why
             log.error("plant %s is not served: %s", plant.key, why)
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:

@@ -120,7 +120,7 @@ def test_name_and_password_are_typed_in_a_browser(people: Any, page: Page, compl
         ("'--", "x"),
     ],
 )
-def test_what_is_wrong_is_not_told(people: Any, name: str, password: str) -> None:
+def test_what_is_wrong_is_not_revealed(people: Any, name: str, password: str) -> None:
     answer = people.client().post("/sign-in", data={"name": name, "password": password})
     if "\0" in name:
         assert answer.status_code == 422

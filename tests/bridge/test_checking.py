@@ -40,7 +40,7 @@ def findings(tmp_path: Path, machine: dict[str, object]) -> list[str]:
     return [str(each) for each in run(check(configuration_from(content, tmp_path)))]
 
 
-def test_readings_for_the_quarantine_and_remarks_are_told(tmp_path: Path) -> None:
+def test_readings_for_the_quarantine_and_remarks_are_reported(tmp_path: Path) -> None:
     lines = [line_of(Printed(7, Unit.MM, Slot(number, 1, 40.0, 0, number, 3, 0, None))) for number in (1, 2, 4)]
     file = tmp_path / "printed.txt"
     file.write_text("\n".join(lines) + "\n", encoding="ascii")
@@ -75,7 +75,7 @@ def test_a_heartbeat_that_is_too_slow_is_sent_more_often_and_named(
     run(work())
 
 
-def test_a_characteristic_of_another_machine_is_told_as_that(shop: Shop, tmp_path: Path) -> None:
+def test_a_characteristic_of_another_machine_is_reported_as_that(shop: Shop, tmp_path: Path) -> None:
     other = Shop(shop.server)
     file = tmp_path / "printed.txt"
     file.write_text("", encoding="ascii")
@@ -87,7 +87,7 @@ def test_a_characteristic_of_another_machine_is_told_as_that(shop: Shop, tmp_pat
     assert not [each for each in said if "refuses the key" in each]
 
 
-def test_a_machine_or_a_server_that_is_silent_or_another_is_told_with_what_to_do(tmp_path: Path) -> None:
+def test_a_machine_or_a_server_that_is_silent_or_another_is_reported_with_what_to_do(tmp_path: Path) -> None:
     folder = table("folder", path=str(tmp_path), format="csv") | {"identity": "cmm-7"}
     said = findings(tmp_path, folder)
     assert [
@@ -138,7 +138,7 @@ def test_nothing_is_tried_out_beside_a_bridge_that_runs(tmp_path: Path) -> None:
     assert "✓ lathe-1: a bridge runs with this store, so nothing was tried out that writes" in said
 
 
-def test_a_store_that_this_user_may_not_write_is_told(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_store_that_this_user_may_not_write_is_reported(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(os, "access", lambda *_: False)
     said = findings(tmp_path, table("dprnt", listen=9))
     assert said[0].startswith(f"✗ store {tmp_path / 'inband-bridge.sqlite3'}: this user may not write {tmp_path};")

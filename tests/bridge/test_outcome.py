@@ -161,7 +161,7 @@ def test_a_wrong_sign_goes_no_further_behind_a_bridge(server: Server, tmp_path: 
 @pytest.mark.long
 @pytest.mark.parametrize("kind", ["rest", "heidenhain"])
 @pytest.mark.parametrize(("amiss", "verdict"), [(2.0, "strong"), (0.5, "weak")])
-def test_radius_for_diameter_costs_no_part_and_is_told(
+def test_radius_for_diameter_costs_no_part_and_is_reported(
     server: Server, tmp_path: Path, kind: str, amiss: float, verdict: str
 ) -> None:
     one, found = mistaken(server, kind, 60, tmp_path, amiss=amiss)
@@ -185,7 +185,9 @@ def test_an_offset_in_inches_is_held_before_it_runs_away(server: Server, tmp_pat
 @pytest.mark.long
 @pytest.mark.parametrize("kind", ["rest", "heidenhain"])
 @pytest.mark.parametrize("amiss", [0.0, 1 / 25.4])
-def test_an_offset_that_does_next_to_nothing_is_told(server: Server, tmp_path: Path, kind: str, amiss: float) -> None:
+def test_an_offset_that_does_next_to_nothing_is_reported(
+    server: Server, tmp_path: Path, kind: str, amiss: float
+) -> None:
     """Parts go out by the wear that nothing takes back; the alarm says that corrections do nothing, tool by tool.
 
     With 1/25.4 a tool that two characteristics correct in each part may settle below the tolerance: 0.5 µm × 25.4 / 2 = 6.35 µm. Its
@@ -201,7 +203,9 @@ def test_an_offset_that_does_next_to_nothing_is_told(server: Server, tmp_path: P
 
 @pytest.mark.long
 @pytest.mark.parametrize("kind", ["rest", "heidenhain"])
-def test_two_tools_that_were_swapped_are_told_and_the_others_go_on(server: Server, tmp_path: Path, kind: str) -> None:
+def test_two_tools_that_were_swapped_are_reported_and_the_others_go_on(
+    server: Server, tmp_path: Path, kind: str
+) -> None:
     one, found = mistaken(server, kind, 40, tmp_path, swapped={2: 3, 3: 2})
     assert {number for number, _ in found.faults(at_once(server, 40))} <= {3, 4, 5}, "the characteristics of the two"
     raised = alarms(one)
@@ -225,7 +229,7 @@ def test_a_probe_that_fails_stops_the_machine_and_corrects_nothing(server: Serve
 
 @pytest.mark.long
 @pytest.mark.parametrize("kind", ["heidenhain", "opcua"])
-def test_without_a_server_nothing_is_lost_nor_applied_twice_and_parts_that_went_out_are_told(
+def test_without_a_server_nothing_is_lost_nor_applied_twice_and_parts_that_went_out_are_reported(
     server: Server, tmp_path: Path, kind: str
 ) -> None:
     """An hour of 24 parts: they wear out of tolerance, uncorrected; the bridge keeps them, and afterwards all is as it should be."""

@@ -166,7 +166,7 @@ def test_what_is_no_longer_pending_is_withdrawn(tmp_path: Path) -> None:
         (Outcome(18, applied=False, offset=0.0, reason="no tool"), [("reject", 18, "no tool")]),
     ],
 )
-def test_each_answer_is_told_once(tmp_path: Path, outcome: Outcome, heard: list[tuple[Any, ...]]) -> None:
+def test_each_answer_is_reported_once(tmp_path: Path, outcome: Outcome, heard: list[tuple[Any, ...]]) -> None:
     server = Scripted()
     unit = story(tmp_path, server, answered(outcome, ORDER, reported=False))
     assert server.heard == heard
@@ -595,7 +595,7 @@ def test_a_heartbeat_is_taken_whatever_a_control_has_sent(tmp_path: Path) -> Non
     run(story())
 
 
-def test_an_edit_is_told_though_each_reading_asks_for_corrections(tmp_path: Path) -> None:
+def test_an_edit_is_reported_though_each_reading_asks_for_corrections(tmp_path: Path) -> None:
     """A tool whose corrections are held: every reading concerns them, one comes after the other."""
 
     async def story() -> None:

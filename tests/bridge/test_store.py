@@ -255,7 +255,7 @@ def test_a_full_disk_is_said_and_what_was_stored_stays(tmp_path: Path) -> None:
     run(story())
 
 
-def test_a_note_of_what_the_server_has_that_fails_is_told_with_the_next(store: Store) -> None:
+def test_a_note_of_what_the_server_has_that_fails_is_reported_with_the_next(store: Store) -> None:
     async def story() -> None:
         await store.add(M, [received(1)])
         [row] = await store.waiting(M)

@@ -49,7 +49,7 @@ def test_what_it_requires_is_what_the_server_requires_too() -> None:
     assert PROJECT["optional-dependencies"] == {name: extras[name] for name in PROJECT["optional-dependencies"]}
 
 
-def test_its_libraries_can_be_told_apart_in_the_constraints() -> None:
+def test_its_libraries_can_be_distinguished_in_the_constraints() -> None:
     text = runpy.run_path(str(HOUSE / ".ci" / "lock.py"))["libraries_of_the_bridge"]()
     pinned = {line.partition("==")[0] for line in text.splitlines() if "==" in line}
     wanted = PROJECT["dependencies"] + [each for extra in PROJECT["optional-dependencies"].values() for each in extra]

@@ -196,7 +196,7 @@ def test_an_answer_that_nobody_asked_for_is_not_taken_for_the_next() -> None:
         (b"SSH-2.0-OpenSSH\r\n", "HTTP"),
     ],
 )
-def test_no_answer_is_told_and_the_next_request_has_a_new_connection(answer: bytes | None, words: str) -> None:
+def test_no_answer_is_reported_and_the_next_request_has_a_new_connection(answer: bytes | None, words: str) -> None:
     async def story() -> None:
         wire = trusting()
         async with server(answer, ANSWER) as there:
@@ -209,7 +209,7 @@ def test_no_answer_is_told_and_the_next_request_has_a_new_connection(answer: byt
     run(story())
 
 
-def test_an_address_where_nobody_listens_is_told() -> None:
+def test_an_address_where_nobody_listens_is_reported() -> None:
     async def story() -> None:
         async with server() as there:
             pass

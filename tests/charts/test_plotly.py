@@ -54,7 +54,7 @@ def test_panels_beside_each_other_have_two_axes_each() -> None:
     )
 
 
-def test_a_point_is_told_in_its_own_words_or_in_those_of_all() -> None:
+def test_a_point_is_described_in_its_own_words_or_in_those_of_all() -> None:
     from_list = to_plotly(Chart([Panel([Series([1], [1], dots=Dots(), hover=["first"])])]))["data"][0]
     assert (from_list["text"], from_list["hovertemplate"]) == (["first"], "%{text}<extra></extra>")
     assert to_plotly(Chart([Panel([COURSE])]))["data"][0]["hovertemplate"] == "%{y}<extra></extra>"

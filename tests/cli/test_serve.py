@@ -97,7 +97,7 @@ WAITING = """SELECT 1 FROM pg_locks JOIN pg_database ON pg_database.oid = databa
     WHERE datname = current_database() AND NOT granted"""
 
 
-def test_a_request_that_the_end_does_not_wait_for_is_told_so(run_server: RunServer) -> None:
+def test_a_request_that_the_end_does_not_wait_for_learns_so(run_server: RunServer) -> None:
     with run_server(workers=1) as server, psycopg.connect(server.database.dsn) as holding:
         client = server.client(server.key("viewer"))
         holding.execute("LOCK TABLE machine")
@@ -262,7 +262,7 @@ def test_a_newer_schema_is_left_alone(new_database: NewDatabase) -> None:
         assert "a newer one has used it" in done.stderr
 
 
-def test_the_version_is_told() -> None:
+def test_the_version_is_reported() -> None:
     """By the program as people start it."""
     done = subprocess.run([sys.executable, "-m", "app", "--version"], cwd=HOUSE, capture_output=True, text=True)
     assert (done.returncode, done.stdout) == (

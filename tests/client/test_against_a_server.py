@@ -147,7 +147,7 @@ class TestWhatTheServerSays:
         assert error.request_id
         assert str(error).count("A reading needs measured") == 1
 
-    def test_a_key_that_lacks_a_role_is_told_so(self, connect: Connect, server: Server) -> None:
+    def test_a_key_that_lacks_a_role_learns_so(self, connect: Connect, server: Server) -> None:
         viewer = connect(server.url, server.key("viewer"))
         with pytest.raises(Forbidden, match="role"):
             viewer.post("/machines", {"key": "m", "name": "M", "control": "other"})
@@ -176,7 +176,7 @@ class TestAway:
         assert machine.push(characteristic=shop.characteristic, measured=40.0, key="k").sequence == 1
         later.join()
 
-    def test_one_that_stays_away_is_told_when_patience_ends(self, connect: Connect) -> None:
+    def test_one_that_stays_away_is_reported_when_patience_ends(self, connect: Connect) -> None:
         away = connect(f"http://127.0.0.1:{free_port()}", "key", patience=0.5)
         with pytest.raises(Unavailable, match=r"POST /readings: No answer after \d attempts") as given_up:
             away.push(characteristic="c", measured=1.0)
@@ -193,7 +193,7 @@ class TestAway:
 
 
 class TestFollowing:
-    def test_what_happens_to_the_machine_is_told_and_taken_up_after_a_restart(
+    def test_what_happens_to_the_machine_is_reported_and_taken_up_after_a_restart(
         self, connect: Connect, mortal_server: Server
     ) -> None:
         shop = Shop(mortal_server)

@@ -281,7 +281,7 @@ class TestStrangeAnswers:
         assert isinstance(error, NotFound)
         assert str(error).startswith("GET /x: 404")
 
-    def test_a_certificate_that_is_not_trusted_is_told_at_once(
+    def test_a_certificate_that_is_not_trusted_is_reported_at_once(
         self, connect: Connect, tls: Script, certificate: Path
     ) -> None:
         tls.steps = [answer(200, {"items": [], "next": None})]
@@ -337,7 +337,7 @@ class TestFollowing:
             assert events == [tool, Event(kind="message")]
             assert (feed.last, feed.pause) == (5, 0.5)
 
-    def test_a_field_of_another_type_than_today_is_told_all_the_same(self) -> None:
+    def test_a_field_of_another_type_than_today_is_reported_all_the_same(self) -> None:
         (event,) = Feed(None).events(b'event: tool\ndata: {"tool": "T3"}\n\n')
         assert event == Event(kind="tool", extra={"tool": "T3"})
 

@@ -117,7 +117,7 @@ def test_a_filter_by_hand() -> None:
 @pytest.mark.parametrize(
     ("gain", "verdict"), [(-1.0, "opposite"), (0.0, "none"), (0.5, "weak"), (1.0, None), (2.0, "strong")]
 )
-def test_a_gain_is_told_from_few_corrections_whatever_it_is(gain: float, verdict: str | None) -> None:
+def test_a_gain_is_found_from_few_corrections_whatever_it_is(gain: float, verdict: str | None) -> None:
     chance = np.random.default_rng(3)
     offset = np.array([0, 4, -3, 5, -4, 4], np.float64).repeat(5) * 0.001
     found = gain_of(chance.normal(0, 0.0003, 30) + np.arange(30) * 0.00005 + gain * offset, offset, -1.0)
@@ -145,6 +145,6 @@ def test_steps_of_the_process_are_no_corrections_without_effect() -> None:
     assert found is None or found.verdict is None
 
 
-def test_of_too_few_no_gain_is_told() -> None:
+def test_of_too_few_no_gain_is_named() -> None:
     assert gain_of(np.zeros(30), np.array([0, 0.001, 0.002]).repeat(10), -1.0) is None
     assert gain_of(np.zeros(0), np.zeros(0), -1.0) is None

@@ -10,7 +10,7 @@ def cell(**numbers: float | None) -> Figures:
     return Figures(**(nothing | {"readings": 1000, "inner": 1000} | numbers))  # type: ignore[arg-type]
 
 
-def test_the_best_region_holds_what_cannot_be_told_from_the_best() -> None:
+def test_the_best_region_holds_what_cannot_be_distinguished_from_the_best() -> None:
     cells = [cell(ppk=1.5), cell(ppk=1.49), cell(ppk=1.2), None, cell(ppk=None)]
     found = best_region(cells, Criterion.PPK)
     assert (found.best, found.inside) == (0, (True, True, False, False, False))
@@ -37,7 +37,7 @@ def test_of_settings_as_good_as_the_best_one_corrects_least() -> None:
     assert (found.best, found.calmest) == (0, 1)
 
 
-def test_settings_out_of_order_are_told() -> None:
+def test_settings_out_of_order_are_reported() -> None:
     assert in_order(SEAT)
     assert not in_order(with_settings(SEAT, zero_range=0.0053))
     assert not in_order(with_settings(SEAT, averaging_limit=0.0081))

@@ -103,7 +103,7 @@ def test_intervals_hold_although_neighbours_are_alike() -> None:
     assert plain / 200 < 0.85
 
 
-def test_what_cannot_be_told_apart_gets_no_effect() -> None:
+def test_what_cannot_be_distinguished_gets_no_effect() -> None:
     rng = np.random.default_rng(1)
     x = rng.normal(size=60)
     other = rng.normal(size=60)

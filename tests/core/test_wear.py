@@ -44,7 +44,7 @@ def test_a_correction_does_not_show_in_the_curve(factor: float) -> None:
     assert wear(np.array([0.007, 0.0]), np.array([0.0, factor * 0.007]), factor) == pytest.approx([0.007, 0.007])
 
 
-def test_an_edit_that_moved_the_parts_is_taken_out_and_one_that_only_told_is_not() -> None:
+def test_an_edit_that_moved_the_parts_is_taken_out_and_one_that_only_reported_is_not() -> None:
     sequence = np.arange(1, 21)
     flat = np.full(20, 0.001)
     moved = flat - 0.25 * (sequence >= 11)  # 0.25 mm typed in, factor -1: the parts came out 0.25 smaller
@@ -83,7 +83,7 @@ def test_scatter_does_not_count_wear_steps_or_chips() -> None:
     assert scatter_of(np.zeros(1)) == 0.0
 
 
-def test_scatter_is_told_of_rounded_sizes_too() -> None:
+def test_scatter_is_reported_rounded_sizes_too() -> None:
     rounded = np.round(line(4000, 0.0, 0.0008, seed=1), 3)
     assert scatter_of(rounded) == pytest.approx(np.sqrt(0.0008**2 + 0.001**2 / 12), rel=0.08)
 

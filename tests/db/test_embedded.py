@@ -334,7 +334,7 @@ def test_a_folder_that_cannot_be_written_is_refused_in_words(folder: Path) -> No
         EmbeddedServer(folder / "file" / "data").start()
 
 
-def test_a_full_disk_is_told_before_anything_is_made(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_full_disk_is_reported_before_anything_is_made(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(embedded, "ROOM", 2**60)
     with pytest.raises(EmbeddedServerError, match="MB free"):
         EmbeddedServer(folder / "data").start()
@@ -464,6 +464,6 @@ class TestPrograms:
         newer = (18, len(binaries.RELEASED))
         assert binaries.age(newer, embedded=True, today=today) is None, "it may be of yesterday"
 
-    def test_releases_that_are_not_supported_are_told(self) -> None:
+    def test_releases_that_are_not_supported_are_reported(self) -> None:
         assert "older than Inband supports" in (binaries.advice((15, 18), embedded=False) or "")
         assert "newer than the release" in (binaries.advice((19, 0), embedded=False) or "")

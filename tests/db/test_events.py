@@ -29,7 +29,7 @@ def test_one_row_for_all_that_a_transaction_publishes(database: Database) -> Non
     assert told(database) == [["one", "two", "three"]]
 
 
-def test_what_is_rolled_back_is_not_told(database: Database) -> None:
+def test_what_is_rolled_back_is_not_sent(database: Database) -> None:
     with pytest.raises(ZeroDivisionError), database.begin() as session:
         publish(session, {"kind": "lost"})
         raise ZeroDivisionError

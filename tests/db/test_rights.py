@@ -146,7 +146,7 @@ def test_check_says_what_the_role_may_and_what_is_not_protected(server: Server, 
     assert f"{ROLE} lacks INSERT on exclusion" in said
 
 
-def test_who_may_not_migrate_is_told_who_may(first_program: str, serving: str) -> None:
+def test_who_may_not_migrate_learns_who_may(first_program: str, serving: str) -> None:
     with psycopg.connect(first_program, autocommit=True) as connection:
         connection.execute(GRANTS)
     with pytest.raises(migrate.MigrationError, match=f"role {ROLE} may not"):

@@ -45,7 +45,7 @@ def test_metrics_count_what_is_in_the_record(shop: Shop) -> None:
     assert of("inband_corrections", status="pending") == 2
 
 
-def test_the_room_on_the_disk_is_told(server: Server) -> None:
+def test_the_room_on_the_disk_is_reported(server: Server) -> None:
     assert metrics(server)["inband_disk_free_bytes", ()] > 0
 
 

@@ -159,7 +159,7 @@ def quiet(server: Server) -> Quiet:
     return lambda listener: listener.until(mark(server.database)) == []
 
 
-def test_a_reading_is_told_with_what_it_led_to(shop: Shop, listening: Listening, quiet: Quiet) -> None:
+def test_a_reading_is_reported_with_what_it_led_to(shop: Shop, listening: Listening, quiet: Quiet) -> None:
     with listening(shop.admin) as listener:
         shop.read(350.0)
         told = {event.kind: event for event in (listener.next(), listener.next(), listener.next())}
@@ -208,7 +208,7 @@ def test_a_page_opened_during_the_check_of_accesses_stays_open(
     run(check())
 
 
-def test_what_people_set_up_is_told(shop: Shop, listening: Listening) -> None:
+def test_what_people_set_up_is_reported(shop: Shop, listening: Listening) -> None:
     with listening(shop.admin) as listener:
         other = Shop(shop.server)
         kinds = {listener.next().kind, listener.next().kind}
@@ -220,7 +220,7 @@ def test_what_people_set_up_is_told(shop: Shop, listening: Listening) -> None:
         assert (event.data["machine"], event.data["average_memory"]) == (other.machine, 5)
 
 
-def test_two_averages_of_one_transaction_are_both_told(shop: Shop, listening: Listening) -> None:
+def test_two_averages_of_one_transaction_are_both_reported(shop: Shop, listening: Listening) -> None:
     second = f"{shop.characteristic}-b"
     shop.add(second, average_memory=6)
     with listening(shop.admin) as listener:
@@ -238,7 +238,7 @@ def test_an_exclusion_is_not_lost_among_readings(shop: Shop, listening: Listenin
         assert {(data["sequence"], data.get("excluded", False)) for data in told} == {(1, True), (2, False)}
 
 
-def test_of_many_readings_at_once_the_last_is_told(shop: Shop, listening: Listening, quiet: Quiet) -> None:
+def test_of_many_readings_at_once_the_last_is_reported(shop: Shop, listening: Listening, quiet: Quiet) -> None:
     with listening(shop.admin) as listener:
         readings = [{"characteristic": shop.characteristic, "measured": 40.0} for _ in range(2000)]
         assert shop.admin.post("/api/v1/readings/batch", json=readings).json()["stored"] == 2000
@@ -272,7 +272,7 @@ class TestResuming:
             shop.read(0.0)
             assert listener.next("reading").data["sequence"] == 5
 
-    def test_cut_off_within_a_transaction_it_is_told_whole_again(self, shop: Shop, listening: Listening) -> None:
+    def test_cut_off_within_a_transaction_it_is_sent_whole_again(self, shop: Shop, listening: Listening) -> None:
         with listening(shop.admin) as listener:
             shop.read(0.0)
             assert listener.next("reading").id is not None
@@ -332,7 +332,7 @@ class TestResuming:
             assert listener.next("reading").data["machine"] == "x"
 
     @pytest.mark.parametrize("missed", [MOST_MISSED - 1, MOST_MISSED])
-    def test_as_much_as_is_told_is_told_one_by_one(self, shop: Shop, missed: int) -> None:
+    def test_as_much_as_is_reported_is_reported_one_by_one(self, shop: Shop, missed: int) -> None:
         with psycopg.connect(shop.server.database.dsn, autocommit=True) as connection:
             connection.execute("DELETE FROM event")
             connection.execute(
@@ -385,7 +385,7 @@ class TestWhoHearsWhat:
             assert answer.status_code == 422, answer.text
 
 
-def test_many_clients_are_all_told(shop: Shop) -> None:
+def test_many_clients_all_hear_of_it(shop: Shop) -> None:
     key = shop.server.key("viewer")
     with ExitStack() as stack:
         listeners = [stack.enter_context(stream(shop.server.client(key))) for _ in range(40)]

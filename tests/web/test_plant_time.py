@@ -171,7 +171,7 @@ def test_an_hour_that_is_missing_is_refused(berlin: Shop, engineer: Person, wher
     assert 'value="2026-03-29T02:30"' in page
 
 
-def test_who_was_first_is_told_in_plant_time(shop: Shop) -> None:
+def test_who_was_first_is_reported_in_plant_time(shop: Shop) -> None:
     shop.read(0.1)
     shop.call("POST", f"/readings/{shop.characteristic}/1/exclude", reason="chip")
     problem: Any = shop.call("POST", f"/readings/{shop.characteristic}/1/exclude", 409, reason="chip")

@@ -126,7 +126,7 @@ class TestBodies:
         "media_type",
         ["text/plain", "application/x-www-form-urlencoded", "multipart/form-data", "application/xml", "", "json"],
     )
-    def test_another_content_type_is_told_how(self, shop: Shop, media_type: str) -> None:
+    def test_another_content_type_is_refused_with_what_to_send(self, shop: Shop, media_type: str) -> None:
         answer = shop.admin.post("/api/v1/machines", content=b'{"key": "a"}', headers={"Content-Type": media_type})
         problem = refused(answer, 422)
         assert problem["errors"][0]["field"] == "Content-Type"

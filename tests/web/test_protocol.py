@@ -214,7 +214,7 @@ class TestMoreConnectionsThanFiles:
             until(lambda: len(select(silent, [], [], 0)[0]) >= 4)
             assert [heard(client) for client in select(silent, [], [], 0)[0]] == [b""] * 4
 
-    def test_where_all_are_served_a_new_one_is_told_to_come_back(self, port: int) -> None:
+    def test_where_all_are_served_a_new_one_is_asked_to_come_back(self, port: int) -> None:
         held.answered.clear()
         busy, before = [connected(port) for _ in range(3)], held.count
         for client in busy:

@@ -109,7 +109,7 @@ def test_a_report_that_is_fetched_is_in_the_record_of_changes(followed: Shop, se
 
 
 @pytest.mark.long
-def test_a_person_sees_their_own_change_and_others_are_told_how_old_it_is(
+def test_a_person_sees_their_own_change_and_others_see_how_old_it_is(
     followed: Shop, server: Server, servers: Cluster
 ) -> None:
     author, reader = Person(server, "engineer"), Person(server, "viewer")

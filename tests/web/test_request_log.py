@@ -122,7 +122,7 @@ def test_nobody_writes_lines_of_their_own_into_it(ended: Ended) -> None:
     assert not any("\x1b[31m" in line for line in ended.lines)
 
 
-def test_sign_ins_are_told_by_name_and_by_address(common_shop: Shop, server: Server) -> None:
+def test_sign_ins_are_reported_by_name_and_by_address(common_shop: Shop, server: Server) -> None:
     anna = unique("Anna")
     server.person(anna, "operator", PASSWORD)
     client = server.client()

@@ -102,7 +102,7 @@ class _Reading:
         self._above: set[str] = set()  # fields for all that are above their values, as above the first ones
         self._waiting: Remark | None = None  # the last of them, until its values come
         self._closed = False  # by a field for all: what comes next is another row
-        self._told: set[str] = set()  # fields for all since it was closed
+        self._given: set[str] = set()  # fields for all since it was closed
         self._held: dict[str, str] = {}
         self._longer = False  # a row with more fields than are known was remarked on
         self._begins: str | None = None
@@ -252,13 +252,13 @@ class _Reading:
                 yield from self._all_open()
                 self._for_all = {}
             if not self._closed:
-                self._told.clear()
+                self._given.clear()
             self._closed = bool(self._open)
             if not self._open:
                 self._for_all[key] = value
                 self._waiting = Remark(number, f"{key}/0", value[:40], "", wrong=True)
-            if key not in self._told:  # the same field once more says nothing new to those that are open
-                self._told.add(key)
+            if key not in self._given:  # the same field once more says nothing new to those that are open
+                self._given.add(key)
                 for each in self._open.values():
                     each.fields.setdefault(key, value)
             return

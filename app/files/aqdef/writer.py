@@ -205,14 +205,14 @@ class _Texts:
 
     def __init__(self, done: Outcome) -> None:
         self._done = done
-        self._told: set[tuple[str, str]] = set()
+        self._written: set[tuple[str, str]] = set()
 
     def fit(self, key: str, text: str) -> str:
         plain = _SIGNS.sub(lambda signs: "," if signs[0] == ";" else " ", text).strip()
         most = most_of(key)
         short = plain[:most].rstrip()
-        if short != text.strip() and (key, text) not in self._told and len(self._told) < 100:
-            self._told.add((key, text))
+        if short != text.strip() and (key, text) not in self._written and len(self._written) < 100:
+            self._written.add((key, text))
             if short != plain:
                 reason = _("{key} holds {most} characters: {text} is written as {short}.")
             else:

@@ -31,7 +31,7 @@ from app.quality.control_charts.schemas import (
     Grouping,
     PeriodIn,
 )
-from app.quality.control_charts.strata import told_apart_by
+from app.quality.control_charts.strata import distinguished_by
 from app.quality.control_charts.tables import Baseline
 from app.quality.control_charts.view import Marks
 from app.web.api import FIGURE, CharacteristicKey, Limit, Theme, Width, api_router, chart_answer, problems, sent_again
@@ -202,12 +202,12 @@ def get_control_chart(
     baseline = _judge(session, current, version)
     if baseline is None:
         view = charts.unjudged(session, current, window)
-        figure = told_apart_by(session, current, view, control_figure(view, key=characteristic, width=width), by)
+        figure = distinguished_by(session, current, view, control_figure(view, key=characteristic, width=width), by)
         return _with_events(session, current, figure, width, theme)
     view = charts.view(session, current, baseline, window, chart)
     marked = charts.marked_by(baseline) if signal is None else _run_of(session, current, signal)
     figure = control_figure(view, key=characteristic, marked=marked, width=width)
-    figure = told_apart_by(session, current, view, figure, by)
+    figure = distinguished_by(session, current, view, figure, by)
     return _with_events(session, current, figure, width, theme)
 
 

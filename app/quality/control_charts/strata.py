@@ -3,7 +3,7 @@
 import numpy as np
 from sqlalchemy.orm import Session
 
-from app.charts import Chart, told_apart
+from app.charts import Chart, distinguished
 from app.core.context import ContextField
 from app.loop.characteristics.queries import CurrentCharacteristic
 from app.loop.readings.wording import field_word
@@ -11,7 +11,7 @@ from app.loop.summaries import queries as statistics
 from app.quality.control_charts.view import View
 
 
-def told_apart_by(
+def distinguished_by(
     session: Session, current: CurrentCharacteristic, view: View, figure: Chart, by: ContextField | None
 ) -> Chart:
     """The figure with its points in the look of their stratum; a subgroup of several has the look of none."""
@@ -22,4 +22,4 @@ def told_apart_by(
     spans = zip(view.first.tolist(), view.last.tolist(), strict=True)
     groups = {last: strata.labels[first - start : last - start + 1] for first, last in spans}
     labels = {last: int(group[0]) if (group == group[0]).all() else -1 for last, group in groups.items()}
-    return told_apart(figure, "points", labels, [f"{field_word(by)} {name}" for name in strata.names])
+    return distinguished(figure, "points", labels, [f"{field_word(by)} {name}" for name in strata.names])

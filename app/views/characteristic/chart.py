@@ -168,7 +168,7 @@ def _blocks(key: str, course: ChartData, *, with_average: bool = False) -> list[
     ]
 
 
-def told_apart(
+def distinguished(
     session: Session,
     current: CurrentCharacteristic,
     figure: charts.Chart,
@@ -181,7 +181,7 @@ def told_apart(
     strata = statistics.strata_of(session, current.characteristic, by, ascending)
     labels = dict(zip(ascending.tolist(), strata.labels.tolist(), strict=True))
     names = [f"{field_word(by)} {name}" for name in strata.names]
-    drawn = charts.told_apart(figure, meta, [labels[sequence] for sequence in sequences], names)
+    drawn = charts.distinguished(figure, meta, [labels[sequence] for sequence in sequences], names)
     return drawn if sequences else said(drawn, _("too many readings to tell them apart"))
 
 

@@ -13,7 +13,7 @@ from app.loop.characteristics.wording import result_label
 from app.loop.summaries import queries as statistics
 from app.loop.summaries.queries import Window
 from app.loop.timeline import queries as timeline
-from app.views.characteristic.chart import at_20_of, chart_of, only, results_of, run_of, told_apart
+from app.views.characteristic.chart import at_20_of, chart_of, distinguished, only, results_of, run_of
 from app.views.characteristic.figures import counting_edges, histogram_figure, result_figure, run_figure, zone_chart
 from app.web.api import FIGURE, CharacteristicKey, Theme, Width, api_router, chart_answer, problems
 from app.web.choice import Choice, Chosen
@@ -77,7 +77,7 @@ def get_zone_chart(
         at_20=at_20_of(session, current, chart.points) if at_20 else None,
     )
     if by is not None:
-        figure = told_apart(session, current, figure, "readings", [point.sequence for point in chart.points], by)
+        figure = distinguished(session, current, figure, "readings", [point.sequence for point in chart.points], by)
     return chart_answer(only(figure, window.context), theme)
 
 
@@ -99,7 +99,7 @@ def get_run_chart(
     run = run_of(session, current, window)
     figure = run_figure(run.points, current.parameters, sizes=run.sizes, blocks=run.blocks)
     if by is not None:
-        figure = told_apart(session, current, figure, "run", [point.sequence for point in run.points], by)
+        figure = distinguished(session, current, figure, "run", [point.sequence for point in run.points], by)
     over = window.first, window.last
     return chart_answer(timeline.with_events(session, current, only(figure, window.context), width, over=over), theme)
 

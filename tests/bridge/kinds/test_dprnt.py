@@ -284,7 +284,7 @@ def test_lines_of_a_file_have_their_times_and_teach_the_clock_once_it_is_followe
     run(work())
 
 
-def test_missing_sequences_are_told_until_they_come() -> None:
+def test_missing_sequences_are_reported_until_they_come() -> None:
     async def work() -> None:
         link = canned(lines(1, 2, 5), lines(3), lines(1, 2, 3, 4, 5), lines(6), lines(40))
         first = await taken(link)
@@ -304,7 +304,7 @@ def test_missing_sequences_are_told_until_they_come() -> None:
     run(work())
 
 
-def test_a_gap_over_a_restart_is_told() -> None:
+def test_a_gap_over_a_restart_is_reported() -> None:
     async def work() -> None:
         link = canned(lines(12))
         await taken(link, Position(7, 9))
@@ -345,7 +345,7 @@ def test_contradictions_and_wrong_units_go_to_the_quarantine() -> None:
     run(work())
 
 
-def test_a_new_epoch_is_told() -> None:
+def test_a_new_epoch_is_reported() -> None:
     async def work() -> None:
         link = canned(lines(8), lines(1, epoch=9))
         await taken(link)

@@ -270,7 +270,7 @@ def test_keys_of_aqdef_stay_whatever_the_head_of_the_file_becomes(tmp_path: Path
     assert len({each.key for each in first.entries}) == 3
 
 
-def test_readings_without_time_and_part_are_told_apart_by_the_file(tmp_path: Path) -> None:
+def test_readings_without_time_and_part_are_distinguished_by_the_file(tmp_path: Path) -> None:
     columns = {"measured": "actual", "characteristic": "feature"}
     text = "feature;actual\nD40;40,01\n"
     keys = {read(tmp_path, text, stamp=stamp, columns=columns).entries[0].key for stamp in ("a", "b", "b")}
@@ -302,7 +302,7 @@ def test_an_own_key_names_the_reading_wherever_it_stands(tmp_path: Path) -> None
         ({"done": "."}, "two other folders"),
     ],
 )
-def test_contradictions_are_told_with_their_place(tmp_path: Path, settings: dict[str, Any], words: str) -> None:
+def test_contradictions_are_reported_with_their_place(tmp_path: Path, settings: dict[str, Any], words: str) -> None:
     with pytest.raises(ConfigurationError, match=r"machine.cmm-1.folder") as caught:
         machine(tmp_path, **settings)
     assert words in str(caught.value)
@@ -544,7 +544,7 @@ def test_a_file_that_takes_longer_than_a_call_is_read_once(tmp_path: Path, monke
     run(work())
 
 
-def test_a_folder_that_is_away_is_told_and_comes_back(tmp_path: Path) -> None:
+def test_a_folder_that_is_away_is_reported_and_comes_back(tmp_path: Path) -> None:
     async def work() -> None:
         store = store_in(tmp_path / "store")
         inbox = tmp_path / "in"
@@ -569,7 +569,7 @@ def test_a_file_in_the_folder_names_it(tmp_path: Path) -> None:
     run(work())
 
 
-def test_files_that_cannot_be_moved_hold_up_no_others_and_are_told(tmp_path: Path) -> None:
+def test_files_that_cannot_be_moved_hold_up_no_others_and_are_reported(tmp_path: Path) -> None:
     async def work() -> None:
         write(tmp_path / "done", "a file where the folder should be")
         link = Folder(machine(tmp_path))
@@ -697,7 +697,7 @@ def test_the_reason_of_a_failed_file_is_not_written_through_a_link(tmp_path: Pat
 
 
 @pytest.mark.skipif(os.geteuid() == 0, reason="root may read every file")
-def test_a_locked_file_is_told_after_a_while(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_locked_file_is_reported_after_a_while(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("app.bridge.kinds.folder.LOCKED_FOR", 0.0)
 
     async def work() -> None:

@@ -188,7 +188,7 @@ def test_what_is_no_reading_goes_to_the_quarantine(tmp_path: Path, payload: byte
     run(work())
 
 
-def test_what_the_server_refuses_later_is_told_the_machine(tmp_path: Path) -> None:
+def test_what_the_server_refuses_later_is_reported_to_the_machine(tmp_path: Path) -> None:
     async def work() -> None:
         store = store_in(tmp_path / "store")
         async with Broker(tmp_path) as broker, fetching(machine(broker.port), store) as unit:
@@ -357,7 +357,7 @@ def test_decisions_are_published_and_the_list_is_in_the_order_of_the_numbers(tmp
     run(work())
 
 
-def test_a_broker_that_is_away_and_direct_writing_are_told() -> None:
+def test_a_broker_that_is_away_and_direct_writing_are_reported() -> None:
     async def work() -> None:
         with pytest.raises(ControlAway, match=r"The broker 127\.0\.0\.1:\d+ does not answer"):
             await link(machine(free_port())).connect()
@@ -367,7 +367,7 @@ def test_a_broker_that_is_away_and_direct_writing_are_told() -> None:
     run(work())
 
 
-def test_a_refused_login_is_told(tmp_path: Path) -> None:
+def test_a_refused_login_is_reported(tmp_path: Path) -> None:
     async def work() -> None:
         users = tmp_path / "users"
         users.write_text("other:$7$101$AAAA$AAAA\n", encoding="utf-8")
@@ -378,7 +378,7 @@ def test_a_refused_login_is_told(tmp_path: Path) -> None:
     run(work())
 
 
-def test_a_broker_that_lets_the_bridge_not_write_is_told(tmp_path: Path) -> None:
+def test_a_broker_that_lets_the_bridge_not_write_is_reported(tmp_path: Path) -> None:
     async def work() -> None:
         rights = tmp_path / "rights"
         rights.write_text("topic read inband/v1/#\n", encoding="utf-8")
@@ -414,7 +414,7 @@ def test_the_check_publishes_what_the_bridge_will_publish(tmp_path: Path) -> Non
     run(work())
 
 
-def test_two_bridges_with_one_client_id_are_told(tmp_path: Path) -> None:
+def test_two_bridges_with_one_client_id_are_reported(tmp_path: Path) -> None:
     async def work() -> None:
         async with Broker(tmp_path) as broker:
             chosen = machine(broker.port)
@@ -472,7 +472,7 @@ def _openssl(folder: Path, *words: str) -> None:
         ({"password_env": "X"}, "a password needs a username"),
     ],
 )
-def test_contradictions_are_told_with_their_place(settings: dict[str, Any], words: str) -> None:
+def test_contradictions_are_reported_with_their_place(settings: dict[str, Any], words: str) -> None:
     with pytest.raises(ConfigurationError, match=r"machine.lathe-1.mqtt") as caught:
         machine(1, **settings)
     assert words in str(caught.value)

@@ -216,7 +216,7 @@ def test_a_part_that_did_not_change_in_a_gap_stays_known() -> None:
     run(work())
 
 
-def test_what_an_agent_told_before_it_went_silent_is_not_taken_for_later_readings() -> None:
+def test_what_an_agent_reported_before_it_went_silent_is_not_taken_for_later_readings() -> None:
     async def work() -> None:
         async with agent() as simulator, asking(simulator) as (context, http):
             simulator.observe("count", "7")

@@ -84,7 +84,7 @@ def test_lines_become_readings_and_what_stands_above_holds() -> None:
     assert all(each.body["measured_at"] for each in found)
 
 
-def test_a_line_that_is_printed_again_is_the_same_reading_if_it_can_be_told() -> None:
+def test_a_line_that_is_printed_again_is_the_same_reading_if_that_can_be_seen() -> None:
     same = printed(b"PART P7\nD40 ACTUAL 40.0\nD40 ACTUAL 40.0\nD40 ACTUAL 40.1\n")
     assert len({each.key for each in same}) == 2
     unnamed = printed(b"D40 ACTUAL 40.0\nD40 ACTUAL 40.0\n")

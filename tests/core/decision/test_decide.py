@@ -197,7 +197,7 @@ def test_the_same_error_seen_again_before_the_correction_took_effect_corrects_no
         assert (again.decided, again.zone, again.action) == (0.0, Zone.ZERO, Action.NONE)
 
 
-def test_a_bad_part_is_told_even_when_its_error_has_been_corrected_since(shaft: Made) -> None:
+def test_a_bad_part_is_reported_even_when_its_error_has_been_corrected_since(shaft: Made) -> None:
     decision = decide(shaft(), LoopState(), 0.0095, outstanding=-0.0095)
     assert (decision.zone, decision.action, decision.good) == (Zone.ZERO, Action.NONE, False)
     assert decision.alarms == (ReadingAlarm.OVERSIZE,)
@@ -209,7 +209,7 @@ def test_a_good_part_is_not_called_bad_because_of_a_correction_still_to_come(sha
     assert decision.alarms == ()
 
 
-def test_a_probe_fault_is_told_by_the_raw_deviation(shaft: Made) -> None:
+def test_a_probe_fault_is_recognised_by_the_raw_deviation(shaft: Made) -> None:
     decision = decide(shaft(), LoopState(), 1.0, outstanding=-0.9)
     assert (decision.zone, decision.action) == (Zone.PROBE_FAULT, Action.STOP)
 

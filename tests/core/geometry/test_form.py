@@ -364,7 +364,7 @@ class TestSuspicion:
             named += [each.touch for each in found] == [2]
         assert named / runs >= 0.97 - by_chance(0.97, runs)
 
-    def test_a_chip_on_the_datum_is_told_as_the_datums(self) -> None:
+    def test_a_chip_on_the_datum_is_reported_as_the_datums(self) -> None:
         points = [list(point) for point in plate()]
         random = np.random.default_rng(2)
         for point in points:

@@ -241,7 +241,7 @@ def test_shifts_against_limits(shifts: list[float], limits: tuple[float | None, 
     assert judge_shift(shifts, *limits) is state
 
 
-def test_a_touch_that_does_not_fit_is_told_where_the_repeatability_is_known() -> None:
+def test_a_touch_that_does_not_fit_is_reported_where_the_repeatability_is_known() -> None:
     around = [(20 * cos(angle), 20 * sin(angle)) for angle in range(7)]
     good = [Touch(x, y) for x, y in around]
     chip = [Touch(x + 0.05 * (at == 2), y) for at, (x, y) in enumerate(around)]

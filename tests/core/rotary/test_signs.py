@@ -120,7 +120,9 @@ def test_an_angle_error_has_the_sign_of_the_axis(carries: Carried, reversed_: bo
     ("is_so", "sent_as", "fits"),
     [("reversed", "table", "reversed"), ("head", "table", "head"), ("table", "head", "table")],
 )
-def test_what_was_sent_as_something_else_is_refused_and_told(is_so: str, sent_as: str, fits: str, said: bool) -> None:
+def test_what_was_sent_as_something_else_is_refused_and_reported(
+    is_so: str, sent_as: str, fits: str, said: bool
+) -> None:
     built = machine("C", {"EX0C": 0.02}, reversed_=is_so == "reversed")
     ball = np.array(BELIEVED) + FAR["C"]
     look = built.head if is_so == "head" else built.table

@@ -126,7 +126,7 @@ class TestSingle:
         assert found.bias.significant
         assert not found.few
 
-    def test_a_coarse_gauge_is_told(self) -> None:
+    def test_a_coarse_gauge_is_reported(self) -> None:
         for resolution in (0.01, None):  # as it is entered, or as the values show it
             found = single.type_one([1.0, 1.01, 1.02] * 4, 1.01, 0.1, resolution=resolution)
             assert not found.resolved
@@ -265,7 +265,7 @@ def test_linearity_does_not_know_unit_sign_or_zero(values: list[int], shift: flo
     assert after.slope.p_value == pytest.approx(before.slope.p_value, rel=1e-4, abs=1e-9)
 
 
-def test_negative_variances_are_told() -> None:
+def test_negative_variances_are_reported() -> None:
     rng = np.random.default_rng(8)
     found = [by_anova(rng.normal(size=(8, 2, 3))) for _ in range(40)]
     told = {name for study in found for name in study.zeroed}

@@ -181,7 +181,7 @@ class TestWithoutScripts:
             ({"repeatability": "-1"}, "greater than 0"),
         ],
     )
-    def test_what_is_wrong_is_told_and_nothing_typed_is_lost(
+    def test_what_is_wrong_is_reported_and_nothing_typed_is_lost(
         self, shop: Shop, operator: Person, more: dict[str, str], words: str
     ) -> None:
         before = len(shop.call("GET", f"/alignments?machine={shop.machine}&limit=1000")["items"])

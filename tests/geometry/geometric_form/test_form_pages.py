@@ -74,7 +74,7 @@ class TestWithoutScripts:
             ("nan 0\n0 1\n-1 0\n0 -1", "line 1 is not a valid point"),
         ],
     )
-    def test_bad_touches_are_told_and_nothing_typed_is_lost(
+    def test_bad_touches_are_reported_and_nothing_typed_is_lost(
         self, shop: Shop, operator: Person, touches: str, words: str
     ) -> None:
         page = operator.send(

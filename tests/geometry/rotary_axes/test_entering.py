@@ -35,7 +35,7 @@ class TestKinematics:
         ]
         assert {"kinematics changed", "kinematics put back"} <= set(actions)
 
-    def test_of_two_who_enter_one_is_told(self, shop: Shop) -> None:
+    def test_of_two_who_enter_one_is_informed(self, shop: Shop) -> None:
         one, two = take(shop, axes=[axis()]), take(shop, axes=[axis(seed=2)])
         shop.call("POST", f"{RUNS}/{two['run']}/enter", reason="mine")
         assert "already" in shop.call("POST", f"{RUNS}/{two['run']}/enter", 409, reason="mine")["detail"]
@@ -117,7 +117,7 @@ class TestUndo:
             assert sorted(each.status_code for each in answers) == [200, 409, 409, 409, 409, 409]
         assert [each["version"] for each in backups(shop)] == [1, 2, 3]
 
-    def test_who_looked_at_another_version_is_told(self, shop: Shop) -> None:
+    def test_who_looked_at_another_version_is_informed(self, shop: Shop) -> None:
         one = take(shop, axes=[axis()])
         enter(shop, one)
         two = take(shop, axes=[axis((0.002, 0, 0, 0))])

@@ -57,7 +57,7 @@ def test_what_is_to_be_entered_makes_the_machine_true(
 
 
 @pytest.mark.parametrize(("sent", "hint"), [({"carries": "head"}, "table"), ({"reversed": True}, "reversed direction")])
-def test_what_was_sent_as_something_else_is_told(shop: Shop, sent: dict[str, Any], hint: str) -> None:
+def test_what_was_sent_as_something_else_is_reported(shop: Shop, sent: dict[str, Any], hint: str) -> None:
     machine = Machine("C", Place(PLACE), Place(PLACE))
     problem = take(shop, 422, axes=[run_of(machine, "table") | sent], ball_radius=RADIUS)
     assert "mm from the positions to which axis C would turn the sphere" in problem["detail"]

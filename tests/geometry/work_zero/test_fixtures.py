@@ -16,7 +16,7 @@ from tests.shop import Shop
 
 
 class TestFixtures:
-    def test_a_shifting_vice_is_seen_and_told(self, shop: Shop) -> None:
+    def test_a_shifting_vice_is_seen_and_reported(self, shop: Shop) -> None:
         first = post(shop, fixture="vice")
         assert first["shift"]["state"] == "unknown"
         path = f"/work-zeros/fixtures/{shop.machine}/vice"

@@ -63,7 +63,7 @@ class TestWithoutScripts:
         assert "Nothing else was changed." in again
         assert "Already acknowledged by another user" not in again
 
-    def test_who_comes_second_is_told_who_was_first(self, shop: Shop, operator: Person, server: Any) -> None:
+    def test_who_comes_second_learns_who_was_first(self, shop: Shop, operator: Person, server: Any) -> None:
         number = shop.read(350.0)["correction"]["number"]
         path = f"/alarms/{shop.alarms()[0]['id']}/acknowledge"
         operator.send(path, action="keep_cutting", comment="Edge good")

@@ -329,7 +329,7 @@ class TestOnce:
         assert ring(shop, key="ring:1")["number"] == ring(shop, 200, key="ring:1")["number"]
         assert len(shop.call("GET", f"/machines/{shop.machine}/calibrations")["items"]) == 2
 
-    def test_of_two_who_accept_at_once_one_wins_and_the_other_is_told_who(self, shop: Shop) -> None:
+    def test_of_two_who_accept_at_once_one_wins_and_the_other_learns_who(self, shop: Shop) -> None:
         number = calibrate(shop)["number"]
         path = f"/api/v1/machines/{shop.machine}/calibrations/{number}/accept"
         clients = [shop.server.client(shop.server.key(role="operator")) for _ in range(8)]

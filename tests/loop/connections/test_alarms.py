@@ -53,7 +53,7 @@ def test_a_silent_bridge_raises_an_alarm_that_ends_when_it_speaks(shop: Shop, op
     assert shop.alarms() == []
 
 
-def test_an_acknowledged_silence_is_not_told_again_but_the_next_one_is(shop: Shop) -> None:
+def test_an_acknowledged_silence_is_not_reported_again_but_the_next_one_is(shop: Shop) -> None:
     beat(shop)
     silent_for(shop, 10)
     run(shop)
@@ -72,7 +72,7 @@ def test_an_acknowledged_silence_is_not_told_again_but_the_next_one_is(shop: Sho
     assert kinds(shop) == ["bridge_silent"]
 
 
-def test_no_silence_is_told_when_the_server_itself_was_away(shop: Shop) -> None:
+def test_no_silence_is_reported_when_the_server_itself_was_away(shop: Shop) -> None:
     beat(shop)
     silent_for(shop, 30)
     with shop.server.database.begin() as session:

@@ -89,7 +89,7 @@ def test_a_missing_field_is_named(shop: Shop, field: str) -> None:
 
 
 class TestKeys:
-    def test_the_secret_is_told_once_and_works_until_revoked(self, shop: Shop) -> None:
+    def test_the_secret_is_reported_once_and_works_until_revoked(self, shop: Shop) -> None:
         made = shop.call("POST", f"/machines/{shop.machine}/keys", 201, name="cell PC")
         assert set(made) == {"id", "name", "secret", "role"}
         machine = shop.server.client(made["secret"])

@@ -63,7 +63,7 @@ class TestReading:
         assert [problem["field"] for problem in answer["problems"]] == ["parameters.factor"]
         assert answer["program"]["parameters"]["zero_range"] == 0.0012
 
-    def test_macro_variables_are_told_by_their_looks(self, shop: Shop) -> None:
+    def test_macro_variables_are_recognised_by_their_looks(self, shop: Shop) -> None:
         answer = read(shop, BORE)
         assert answer["control"] == "fanuc"
         assert answer["problems"] == []

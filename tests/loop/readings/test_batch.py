@@ -174,7 +174,7 @@ class TestAllOrNothing:
         answer = shop.machine_client.post("/api/v1/readings/batch", content=body, headers=NDJSON)
         assert (answer.status_code, fields(answer.json())) == (422, ["[3]"])
 
-    def test_no_more_errors_are_told_than_somebody_reads(self, shop: Shop) -> None:
+    def test_no_more_errors_are_reported_than_somebody_reads(self, shop: Shop) -> None:
         readings = [{"characteristic": shop.characteristic, "measured": None} for _ in range(500)]
         problem = refused(shop, 422, readings)
         assert len(problem["errors"]) == 100

@@ -113,7 +113,7 @@ def test_numbers_and_spread_of_the_page_are_of_the_context(told: Told, viewer: P
     assert 'name="context.order"' not in viewer.open(f"/characteristics/{told.shop.characteristic}"), "none has any"
 
 
-def test_points_of_a_chart_are_told_apart(told: Told) -> None:
+def test_points_of_a_chart_are_distinguished(told: Told) -> None:
     figure = told.get(f"{told.path}/figures/zones", last="50", by="nest")
     assert [trace["name"] for trace in traces(figure, "stratum")] == ["Nest 2", "Nest 1"]
     (readings,) = traces(figure, "readings")

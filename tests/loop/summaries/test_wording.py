@@ -41,7 +41,7 @@ def test_every_code_has_words_of_its_own() -> None:
         (RuleName.WESTERN_4, "8 points in a row lie on the same side of the centre."),
     ],
 )
-def test_rules_are_told_with_their_numbers(name: RuleName, words: str) -> None:
+def test_rules_are_reported_with_their_numbers(name: RuleName, words: str) -> None:
     assert wording.rule(RULES[name]) == words
 
 

@@ -180,7 +180,7 @@ class TestAverages:
         shop.call("PUT", put, client=shop.machine_client, empirical_value=0.1, reason="calibration cycle")
 
 
-def test_what_is_told_late_draws_no_line_back_in_time() -> None:
+def test_what_is_reported_late_draws_no_line_back_in_time() -> None:
     noon = datetime(2026, 11, 22, 12, tzinfo=UTC)
     changes = [OffsetChange(noon + timedelta(hours=hour), hour / 1000, "correction") for hour in (0, 2, 1)]
     line = to_plotly(offset_figure(changes))["data"][0]

@@ -106,7 +106,7 @@ def test_an_edit_and_a_tool_change_begin_the_evidence_again(loop: Loop, happens:
         (0.0, "none", "does not use this offset"),
     ],
 )
-def test_an_unusual_gain_is_told_with_its_number(
+def test_an_unusual_gain_is_reported_with_its_number(
     shop: Shop, server: Any, effect: float, verdict: str, said: str
 ) -> None:
     loop, chance = Loop(shop, effect), np.random.default_rng(4)
@@ -128,7 +128,7 @@ def test_an_unusual_gain_is_told_with_its_number(
     assert f"from {told['corrections']} corrections" in page
 
 
-def test_an_offset_in_inches_is_told_from_two_corrections(shop: Shop, server: Any) -> None:
+def test_an_offset_in_inches_is_found_from_two_corrections(shop: Shop, server: Any) -> None:
     """More are never made: the third would be of a millimetre, and is held as that of a worn tool."""
     loop = Loop(shop, 25.4)
     loop.size = 1.5

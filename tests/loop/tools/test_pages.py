@@ -56,7 +56,7 @@ class TestWithoutScripts:
             operator.send(f"/machines/{shop.machine}/corrections/{number}", do=verb, reason="looked at")
             assert shop.correction(number)["status"] == "pending"
 
-    def test_who_comes_too_late_is_told_how_it_stands(self, shop: Shop, operator: Person) -> None:
+    def test_who_comes_too_late_learns_how_it_stands(self, shop: Shop, operator: Person) -> None:
         number = shop.read(20.0)["correction"]["number"]
         shop.correction(number, "rejected", reason="limit of the control")
         text = operator.send(f"/machines/{shop.machine}/corrections/{number}", do="applied")

@@ -102,7 +102,7 @@ class TestOffsetDiffers:
         shop.acknowledge(alarm["id"], "noted")
         assert (shop.tool()["offset"], shop.tool()["paused_by"]) == (0.01, None)
 
-    def test_what_was_told_by_hand_meanwhile_is_not_written_over(self, shop: Shop) -> None:
+    def test_what_was_entered_by_hand_meanwhile_is_not_written_over(self, shop: Shop) -> None:
         alarm = reported_otherwise(shop)
         shop.call("PUT", f"/machines/{shop.machine}/tools/3", offset=0.007, reason="read at the control")
         assert shop.tool()["paused_by"] == alarm["id"]  # a person was asked, and a person answers
@@ -318,7 +318,7 @@ class TestExpiry:
             "correction expired"
         ]
 
-    def test_a_machine_that_applied_it_after_all_is_told_what_to_do(self, hasty: Shop, served: Database) -> None:
+    def test_a_machine_that_applied_it_after_all_learns_what_to_do(self, hasty: Shop, served: Database) -> None:
         number = pending(hasty)
         age(served, hasty, number, hours=9)
         rounds(served)

@@ -76,7 +76,7 @@ def test_corrections_in_a_row_raise_it_sooner(shop: Shop, runs: Runs) -> None:
     assert runs(3) == [], "it is not reported again for the same ones"
 
 
-def test_what_the_bridge_holds_back_is_told_at_once_with_its_reason(shop: Shop, runs: Runs) -> None:
+def test_what_the_bridge_holds_back_is_reported_at_once_with_its_reason(shop: Shop, runs: Runs) -> None:
     shop.read(6)
     beat(shop, held_back=[HELD], hold_all=True)
     assert runs(2) == [], "on hold by command"

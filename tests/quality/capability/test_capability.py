@@ -97,7 +97,7 @@ def test_an_excluded_reading_or_a_probe_fault_makes_no_index_preliminary(shop: S
     )
 
 
-def test_a_number_of_readings_that_is_none_is_told_in_words(shop: Shop) -> None:
+def test_a_number_of_readings_that_is_none_is_explained_in_words(shop: Shop) -> None:
     problem = of(shop, "last=0", status=422)
     assert problem["detail"] == "last: must be a number of readings from 1 on, such as 500, or one of: all"
 

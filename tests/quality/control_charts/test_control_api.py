@@ -175,7 +175,7 @@ class TestFrozen:
         frozen(gauged, 1, 41, status=409, key="monday")
         assert len(versions(gauged)) == 1
 
-    def test_readings_excluded_since_leave_the_numbers_and_are_told_of(self, gauged: Shop, server: Server) -> None:
+    def test_readings_excluded_since_leave_the_numbers_and_are_reported(self, gauged: Shop, server: Server) -> None:
         gauged.push([0, 1] * 12)
         made = frozen(gauged, 1, 24)
         viewer, path = Person(server, "viewer"), f"/characteristics/{gauged.characteristic}/control"
@@ -196,7 +196,7 @@ class TestFrozen:
         assert gauged.call("POST", f"{path}/preview", 200, operator, **body)["readings"] == 40
         assert versions(gauged) == []
 
-    def test_live_pages_are_told(self, gauged: Shop, server: Server) -> None:
+    def test_live_pages_hear_of_it(self, gauged: Shop, server: Server) -> None:
         gauged.push([0, 1] * 30)
         frozen(gauged, 1, 40)
         from sqlalchemy import text

@@ -99,7 +99,7 @@ def test_from_the_chart_to_a_frozen_baseline(page: Page, line: Line, engineer: P
 
 
 @pytest.mark.long
-def test_of_two_who_freeze_at_once_the_second_is_told_and_loses_nothing(
+def test_of_two_who_freeze_at_once_the_second_is_informed_and_loses_nothing(
     page: Page, line: Line, engineer: Person, complaints: list[str]
 ) -> None:
     engineer.sign_in(page)

@@ -69,7 +69,7 @@ class TestSettings:
             ({"main": {"nelson_1": "watch"}}, {"main": {"nelson_1": "alarm", "nelson_3": "watch"}}, "tried")
         ]
 
-    def test_who_changes_what_somebody_else_has_changed_is_told_so(self, shop: Shop) -> None:
+    def test_who_changes_what_somebody_else_has_changed_learns_so(self, shop: Shop) -> None:
         line = Line(shop)
         line.rules(main={})
         body: dict[str, Any] = {"rules": {"main": {"nelson_2": "watch"}}, "reason": "why"}

@@ -77,7 +77,7 @@ def test_the_border_of_a_chunk_hides_no_signal(shop: Shop, monkeypatch: pytest.M
     assert all(found == told[0] for found in told)
 
 
-def test_nothing_is_told_of_before_the_baseline_or_the_rule_unless_asked(shop: Shop) -> None:
+def test_nothing_is_reported_before_the_baseline_or_the_rule_unless_asked(shop: Shop) -> None:
     line = Line(shop, baseline=False)
     line.push([7.0, 0.0, 0.0])
     line.freeze(1, 60)

@@ -238,7 +238,7 @@ class TestKeeping:
         assert sorted(answers) == [200, 200, 200, 201]
         assert len(shop.call("GET", f"/gauge-studies?machine={shop.machine}")["items"]) == 1
 
-    def test_parts_that_differ_and_repeats_that_do_not_are_told_apart(self, shop: Shop) -> None:
+    def test_parts_that_differ_and_repeats_that_do_not_are_distinguished(self, shop: Shop) -> None:
         def rows(step: float) -> list[dict[str, Any]]:
             return [
                 {"part": str(part), "operator": who, "values": [40 + step * part] * 3}
@@ -264,7 +264,7 @@ class TestKeeping:
         (change, *_rest) = shop.call("GET", f"/audit?subject=gauge-study/{study['id']}")["items"]
         assert change["after"]["rows"][0]["values"][0] == 0.3
 
-    def test_of_two_who_put_the_same_revision_right_the_second_is_told(self, engineer: Person, shop: Shop) -> None:
+    def test_of_two_who_put_the_same_revision_right_the_second_is_informed(self, engineer: Person, shop: Shop) -> None:
         study = send(shop, "bias", single(), reference=40.0)
         path, given = f"/gauge-studies/{study['id']}", {"gauge": "P", "reference": 40.0, "reason": "typed wrongly"}
         with ThreadPoolExecutor(2) as pool:

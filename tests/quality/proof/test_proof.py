@@ -105,7 +105,7 @@ class TestOncePerProcess:
         assert queries.proof().passed
         assert queries.failing() == ()
 
-    def test_pages_do_not_wait_and_then_are_told(
+    def test_pages_do_not_wait_and_then_hear_of_it(
         self, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
     ) -> None:
         monkeypatch.setattr(queries, "cases", lambda: (l75(9.999),))
@@ -171,7 +171,7 @@ class TestCommand:
         assert "1 not as published" in done.stderr
 
     @pytest.mark.parametrize("text", ["{", "[1]", '[{"kind": "summary"}]', "{}x"])
-    def test_a_file_that_holds_no_examples_is_told(self, tmp_path: Path, text: str) -> None:
+    def test_a_file_that_holds_no_examples_is_reported(self, tmp_path: Path, text: str) -> None:
         path = tmp_path / "examples.json"
         path.write_text(text, encoding="utf-8")
         done = inband("proof", "--examples", path)

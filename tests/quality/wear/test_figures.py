@@ -94,7 +94,7 @@ def test_a_broken_edge_is_drawn_on_the_rim_with_its_true_value_in_words() -> Non
     assert found.last == 60
 
 
-def test_edges_before_are_told_apart_by_a_line_and_a_word() -> None:
+def test_edges_before_are_distinguished_by_a_line_and_a_word() -> None:
     life, _found = line()
     before = Life([-2, -1, 0], [0.001, 0.001, 0.001], [0, 0, 0], [1, 16, 16])
     figure = wear_figure(chart(lives=[before]))

@@ -155,7 +155,7 @@ def outlook(shop: Shop) -> Outlook:
         return found
 
 
-def test_a_loop_that_runs_after_its_scatter_is_told_once_and_by_how_much(shop: Shop) -> None:
+def test_a_loop_that_runs_after_its_scatter_is_reported_once_and_by_how_much(shop: Shop) -> None:
     nervous(shop)
     cut(shop, scatter(60, sigma=1.0, wear=0.0), delay=0, tool=4)
     told = of(shop)["hunting"]
@@ -240,7 +240,7 @@ def test_of_a_very_long_life_older_readings_are_thinned_into_groups(shop: Shop) 
     assert of(shop)["wear_per_part"]["value"] == pytest.approx(1e-7)
 
 
-def test_forecasts_are_tested_on_the_edges_before_and_told_with_what_comes(shop: Shop) -> None:
+def test_forecasts_are_tested_on_the_edges_before_and_reported_with_what_comes(shop: Shop) -> None:
     """Two edges that wore faster in the end: the rounds test what would have been foretold, and page and API say so."""
     none = of(shop)["record"]
     assert (none["lives"], none["tested"], none["held"], none["widened"]) == (0, 0, 0, True)

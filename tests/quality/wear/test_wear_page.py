@@ -24,7 +24,7 @@ def test_before_there_is_enough_it_says_so(viewer: Person, shop: Shop) -> None:
     assert "Too few readings of this tool yet" in text
 
 
-def test_a_loop_that_hunts_is_told_on_all_three_pages_and_noted(operator: Person, shop: Shop) -> None:
+def test_a_loop_that_hunts_is_reported_on_all_three_pages_and_noted(operator: Person, shop: Shop) -> None:
     nervous(shop)
     cut(shop, scatter(50, sigma=1.0, wear=0.0), delay=0, tool=4)
     go(shop)

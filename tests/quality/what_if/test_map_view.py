@@ -54,7 +54,7 @@ def test_an_address_says_what_was_typed(query: dict[str, str]) -> None:
     assert form_reader.typed_from(again) == typed
 
 
-def test_only_what_can_be_told_is_called_better() -> None:
+def test_only_what_can_be_distinguished_is_called_better() -> None:
     today = cell(corrections=400, rejects=10, ppk=1.5, spread=0.001)
     noise = wording.gained(today, cell(corrections=390, rejects=9, ppk=1.51, spread=0.00101))
     assert [better for _text, better in noise if better is not None] == [True]  # corrections are counted, not estimated

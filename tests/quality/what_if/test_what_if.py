@@ -345,7 +345,7 @@ def test_a_machine_that_begins_to_tell_by_number_has_the_pipeline_that_it_has() 
     assert _delays(joined | {"correction_in_effect": np.full(60, -1)}, part) == Delays(delay, delay, delay)
 
 
-def test_corrections_that_waited_unequally_long_are_told(shop: Shop, ran: Shop) -> None:
+def test_corrections_that_waited_unequally_long_are_reported(shop: Shop, ran: Shop) -> None:
     """Somebody lets what has gathered take effect every ten parts; the record says so, and why the replay differs."""
     nervous(shop)
     course, number, offset = scatter(120, 5), 0, 0.0
@@ -363,7 +363,7 @@ def test_corrections_that_waited_unequally_long_are_told(shop: Shop, ran: Shop) 
     ]  # there all waited for one part
 
 
-def test_why_another_index_may_be_quoted_than_on_the_page_of_capability_is_told(shop: Shop) -> None:
+def test_why_another_index_may_be_quoted_than_on_the_page_of_capability_is_reported(shop: Shop) -> None:
     """There control is judged by the frozen baseline, here by limits of the readings themselves."""
     cut(shop, scatter(60))
     assert "frozen baseline" not in " ".join(ask(shop)["cautions"])

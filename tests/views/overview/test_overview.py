@@ -60,7 +60,7 @@ def test_the_alarm_load_is_that_of_the_days_in_which_the_parts_were_measured(sho
     assert item["alarms_per_shift"] == pytest.approx(2 / 21, abs=1e-3)
 
 
-def test_ppk_is_told_of_what_counts(ranking: Shop) -> None:
+def test_ppk_learns_what_counts(ranking: Shop) -> None:
     by_key = {item["key"]: item for item in ranked(ranking)}
     assert by_key["wide"]["ppk"] == pytest.approx(8 / 3 / (5.0 * SPREAD), rel=1e-4)
     assert by_key["wide"]["readings"] == 24

@@ -145,9 +145,7 @@ class TestLive:
         expect(page.locator(".plant-count strong").first).to_have_text(str(needed + 1))
         assert page.evaluate("window.untouched")
 
-    def test_what_happens_before_the_page_is_told_anything_is_shown(
-        self, shop: Shop, viewer: Person, page: Page
-    ) -> None:
+    def test_what_happens_before_the_page_hears_anything_is_shown(self, shop: Shop, viewer: Person, page: Page) -> None:
         held: list[Route] = []
 
         def hold(route: Route) -> None:

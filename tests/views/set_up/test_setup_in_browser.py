@@ -76,7 +76,7 @@ def test_a_name_of_form_fills_in_its_natural_limit_and_nothing_that_is_typed(sig
     assert (page.input_value("[name=nominal]"), page.input_value("[name=natural_limit]")) == ("40", "")
 
 
-def test_a_refused_order_is_told_at_once_in_the_words_of_the_server(
+def test_a_refused_order_is_reported_at_once_in_the_words_of_the_server(
     signed_in: Page, shop: Shop, complaints: list[str]
 ) -> None:
     page = signed_in

@@ -133,7 +133,9 @@ class TestCharacteristics:
         shown = values(engineer.open(f"/setup/characteristics/{key}"))
         assert shown.items() >= {"nominal": "40", "lower_deviation": "-0.016", "target": "", "factor": "-1"}.items()
 
-    def test_a_refused_order_is_told_at_the_field_and_nothing_typed_is_lost(self, engineer: Person, shop: Shop) -> None:
+    def test_a_refused_order_is_reported_at_the_field_and_nothing_typed_is_lost(
+        self, engineer: Person, shop: Shop
+    ) -> None:
         page = self.new(
             engineer, shop, "refused", 422, averaging_limit="0,009", max_step="ein", wear_limit="0.3x", part="0815"
         ).text
@@ -148,7 +150,7 @@ class TestCharacteristics:
         assert re.search(r'id="f-averaging_limit"[^>]*aria-invalid="true"', page)
         shop.call("GET", "/characteristics/refused", 404)
 
-    def test_names_and_parameters_are_told_at_once(self, engineer: Person, shop: Shop) -> None:
+    def test_names_and_parameters_are_reported_at_once(self, engineer: Person, shop: Shop) -> None:
         page = self.new(engineer, shop, "No Key", 422, machine="", zero_range="0.1").text
         assert len(errors(page)) == 3
 

@@ -227,7 +227,7 @@ class TestWhoActs:
         assert "Nobody" not in who
         assert "checked" not in who
 
-    def test_no_name_is_told_from_another(self, tablet: Tablet, milica: Person) -> None:
+    def test_no_name_is_distinguished_from_another(self, tablet: Tablet, milica: Person) -> None:
         tablet.shop.read(12.0)
         notes = []
         for name in (milica.name, "nobody", ""):

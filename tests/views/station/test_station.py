@@ -129,7 +129,7 @@ class TestWithoutScripts:
         assert f"Oversize: Noted, {operator.name}." in text
         assert shop.alarms() == []
 
-    def test_who_comes_second_is_told_who_was_first(self, shop: Shop, operator: Person) -> None:
+    def test_who_comes_second_learns_who_was_first(self, shop: Shop, operator: Person) -> None:
         shop.read(12.0)
         alarm = shop.alarms()[0]["id"]
         shop.acknowledge(alarm, "noted")

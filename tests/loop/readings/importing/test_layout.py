@@ -90,7 +90,7 @@ def test_encodings(tmp_path: Path, encoding: str) -> None:
     assert good(path, encoding=named) == [(39.998, part)]
 
 
-def test_a_file_in_a_wrongly_named_encoding_is_told_what_to_do(tmp_path: Path) -> None:
+def test_a_file_in_a_wrongly_named_encoding_is_refused_with_what_to_do(tmp_path: Path) -> None:
     with pytest.raises(Invalid, match="cp1250 for Serbian"):
         look(write(tmp_path, "measured,part\n39.998,Žižek\n", "cp1250"), Wishes(encoding="utf-8"))
 

@@ -97,7 +97,7 @@ def keys(database: Database, entry: Entry) -> list[str]:
     return [key for (key,) in rows(database.dsn, query, entry.characteristic_id)]
 
 
-def test_the_others_go_on_and_the_held_one_is_told_the_truth(database: Database) -> None:
+def test_the_others_go_on_and_the_held_one_learns_the_truth(database: Database) -> None:
     one, other = plant(database)
 
     async def go() -> None:
@@ -234,7 +234,7 @@ def test_how_a_commit_ended_is_asked_until_the_patience_is_over(database: Databa
     assert isinstance(found, Verdict if heard else OutcomeUnknown)
 
 
-def test_nobody_who_waited_for_a_lock_is_told_of_an_absent_database() -> None:
+def test_nobody_who_waited_for_a_lock_is_informed_of_an_absent_database() -> None:
     request = Request({"type": "http", "method": "POST", "path": "/api/v1/machines", "headers": [], "state": {}})
     for error in (psycopg.errors.LockNotAvailable("timeout"), psycopg.errors.QueryCanceled("timeout")):
         answer = run(unforeseen(request, error))

@@ -196,7 +196,7 @@ class TestPages:
         assert (kept["measured"], kept["verdict"], kept["by"]) == (40.0021, "good", operator.name)
         page.locator("plotly-chart .plot .legendtext", has_text="Measured by hand").first.wait_for()
 
-    def test_what_cannot_be_meant_is_told_in_the_dialog(self, shop: Shop, server: Server) -> None:
+    def test_what_cannot_be_meant_is_reported_in_the_dialog(self, shop: Shop, server: Server) -> None:
         shop.read(10.0)
         path = f"/characteristics/{shop.characteristic}/readings/1/by-hand"
         page = Person(server, "operator").send(path, 422, measured="4000", comment="")
