@@ -23,7 +23,7 @@ MOST_IN_FLOOD = 0.01
 """Share of all ten minutes."""
 STALE, MOST_STALE = timedelta(hours=24), 5
 CHATTER, CHATTERS_WITHIN = 3, timedelta(minutes=1)
-TOP, MOST_OF_TOP = 10, 0.05
+TOP = 10
 DAYS = 30
 
 

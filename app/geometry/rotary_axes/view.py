@@ -104,7 +104,6 @@ def shown_run(
 ) -> Response:
     """The page of a run. late: somebody else was first."""
     row = queries.run(session, number)
-    others = others_of(session, row)
     in_force = queries.in_force(queries.course(session, row.machine.id, row.run.head))
     undoable = row.status == "entered" and bool(in_force) and in_force[-1].run == number
     return page(
@@ -118,11 +117,9 @@ def shown_run(
         errors=run_history.in_order(errors_of(row.run.results)),
         entering=run_history.to_enter(row),
         parameters=parameters_of(row),
-        others=others,
-        earlier=run_history.earlier(row, others),
+        earlier=run_history.earlier(row, others_of(session, row)),
         message=message,
         late=late,
-        may_take=caller.may("operator"),
         may_undo=undoable and caller.may("engineer"),
         taken_back=row.status == "entered" and not undoable and not any(version.run == number for version in in_force),
         **COMMON,

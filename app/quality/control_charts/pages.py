@@ -255,7 +255,6 @@ def _freeze(
         status=error.status if error else 200,
         machine=current.machine,
         characteristic=current.characteristic,
-        parameters=current.parameters,
         choice=choice,
         draft=draft,
         seen_version=queries.newest_version(session, current.characteristic),

@@ -88,7 +88,6 @@ def _what_if(
         status=refused.status if refused else status,
         characteristic=current.characteristic,
         machine=current.machine,
-        version=current.version.version,
         today=current.parameters,
         typed=typed,
         tool_since=summaries.tool_since(session, current.characteristic),
