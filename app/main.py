@@ -7,16 +7,13 @@ import sys
 from collections.abc import AsyncIterator, Callable
 from contextlib import asynccontextmanager
 from functools import partial
+from importlib import import_module
 from threading import Event
 
 from fastapi import APIRouter, FastAPI, Request
 from prometheus_client import Histogram
 from starlette.middleware.gzip import GZipMiddleware
 
-from app.access import api as people
-from app.access import events_api, keys_api, screens_api
-from app.access import pages as sign_in_pages
-from app.access.audit import api as audit
 from app.access.bodies import read_after_recognition
 from app.access.deps import recognise
 from app.access.keys import KeyRing
@@ -26,132 +23,37 @@ from app.core.compile_now import compile_each
 from app.db.connections import Connections
 from app.db.engine import Database
 from app.db.replica import replica_of
-from app.geometry.alignment import api as alignments
-from app.geometry.alignment import pages as alignment_pages
-from app.geometry.alignment import pictures_api as alignment_pictures
-from app.geometry.geometric_form import api as geometric_form
-from app.geometry.geometric_form import pages as form_pages
-from app.geometry.rotary_axes import api as rotary_axes
-from app.geometry.rotary_axes import new_pages as new_run_pages
-from app.geometry.rotary_axes import pages as rotary_axes_pages
-from app.geometry.rotary_axes import plan_api, plan_pages
-from app.geometry.rotary_axes import protocol_api as rotary_axes_protocol
-from app.geometry.work_zero import api as work_zero
-from app.geometry.work_zero import pages as work_zero_pages
 from app.jobs.actions import PeriodicJob
 from app.jobs.runner import JobRunner
 from app.language.times import use_zone
-from app.loop.alarm_response import api as alarms
-from app.loop.alarm_response import pages as alarm_pages
-from app.loop.calibration import api as calibration
 from app.loop.calibration import jobs
-from app.loop.calibration import pages as calibration_pages
-from app.loop.characteristics import api as characteristics
-from app.loop.connections import api as connections_api
 from app.loop.connections import jobs as connection_jobs
-from app.loop.connections import pages as connection_pages
-from app.loop.connections.touch_tests import api as touch_tests_api
-from app.loop.connections.touch_tests import pages as touch_test_pages
-from app.loop.control_plan import api as control_plan
 from app.loop.control_plan import jobs as control_plan_jobs
-from app.loop.control_plan import pages as control_plan_pages
-from app.loop.expansion import api as expansion
-from app.loop.faults import api as faults
-from app.loop.machines import api as machines
-from app.loop.machines import keys_api as machine_keys
 from app.loop.machines.keys import caller_of_key
-from app.loop.notes import api as notes
-from app.loop.notes import pages as note_pages
-from app.loop.notifications import api as notifications
 from app.loop.notifications.notifier import Notifier
 from app.loop.present_context import actions as present_context
-from app.loop.present_context import api as present_context_api
-from app.loop.programs import api as programs
-from app.loop.quarantine import api as quarantine
-from app.loop.quarantine import pages as quarantine_pages
-from app.loop.reactions import api as reactions
-from app.loop.reactions import pages as reaction_pages
 from app.loop.readings import api as readings
-from app.loop.readings import results_actions, table_api
-from app.loop.readings.aqdef import api as aqdef_api
-from app.loop.readings.by_hand import api as by_hand
+from app.loop.readings import results_actions
 from app.loop.readings.door import Directory, ReadingsDoor
-from app.loop.readings.importing import pages as import_pages
 from app.loop.readings.writer import columnar
 from app.loop.readings.writer.group_commit import Writer
-from app.loop.summaries import api as statistics
-from app.loop.tools import api as tools
-from app.loop.tools import edge_pages, edges_api, text_api, text_pages
 from app.loop.tools import jobs as tool_jobs
-from app.loop.tools import pages as tool_pages
 from app.loop.tools.untaken import Watch
 from app.memory import give_back_free_memory, keep_few_arenas
 from app.plants import pages as plants_pages
 from app.plants.prefix import UnderPrefix
 from app.plants.serving import Application, Plants
 from app.quality.capability import actions as capability_actions
-from app.quality.capability import api as capability
-from app.quality.control_charts import api as control
-from app.quality.control_charts import (
-    counts_api,
-    counts_pages,
-    rules_api,
-    rules_pages,
-    signals_actions,
-    signals_api,
-    signals_pages,
-)
-from app.quality.control_charts import pages as control_pages
-from app.quality.gauge_studies import api as gauge_studies
-from app.quality.gauge_studies import pages as gauge_pages
-from app.quality.ledger import api as ledger
-from app.quality.ledger import pages as ledger_pages
-from app.quality.proof import api as proof
-from app.quality.proof import pages as proof_pages
+from app.quality.control_charts import signals_actions
 from app.quality.proof import queries as proofs
-from app.quality.sampling import api as sampling
-from app.quality.sampling import pages as sampling_pages
-from app.quality.temperature import api as temperature
-from app.quality.temperature import pages as temperature_pages
-from app.quality.trial import api as trial
-from app.quality.trial import pages as trial_pages
 from app.quality.wear import actions as wear_actions
-from app.quality.wear import api as wear
-from app.quality.what_if import api as what_if
-from app.quality.what_if import pages as what_if_pages
 from app.settings import Settings
-from app.views.alarm_load import api as alarm_load
-from app.views.alarm_load import pages as alarm_load_pages
-from app.views.approvals import pages as queue_pages
-from app.views.characteristic import capability_pages, figures_api, six_pack
-from app.views.characteristic import pages as characteristic_pages
-from app.views.compare import api as compare
-from app.views.compare import pages as compare_pages
-from app.views.help import pages as help_pages
-from app.views.licences import pages as licence_pages
-from app.views.overview import api as overview
-from app.views.overview import pages as overview_pages
-from app.views.plant import machine_pages, trying_pages
-from app.views.plant import pages as plant_pages
 from app.views.reports import actions as report_actions
-from app.views.reports import api as reports
-from app.views.reports import jobs_api as report_jobs
-from app.views.reports import jobs_pages as report_job_pages
-from app.views.reports import pages as report_pages
-from app.views.reports import points_api as report_points
 from app.views.reports.worker import ReportWorker
-from app.views.search import api as search
-from app.views.search import pages as search_pages
-from app.views.search import readings_api as reading_list
-from app.views.set_up import pages as setup_pages
-from app.views.shift import api as shift
-from app.views.shift import pages as shift_pages
 from app.views.shift.mail import shift_words
-from app.views.station import pages as station_pages
-from app.views.to_do import pages as to_do_pages
 from app.views.to_do.queries import COUNT as TO_DO_COUNT
 from app.views.wall import pages as wall_pages
-from app.web import api_docs, health
+from app.web import health
 from app.web.live import Live
 from app.web.openapi import document
 from app.web.own_changes import OwnChanges
@@ -170,121 +72,69 @@ A reading waits for its turn several times on its way, each time as long as this
 5 ms made readings wait three times as long beside reports (``bench/strangers.py``); a shorter turn than this helped no more.
 """
 
+WITH_ROUTES = """
+    loop.machines.api loop.faults.api loop.connections.api loop.connections.touch_tests.api
+    loop.characteristics.api loop.expansion.api
+    views.characteristic.figures_api
+    loop.summaries.api
+    quality.capability.api
+    views.compare.api views.overview.api views.shift.api views.search.api
+    quality.proof.api quality.wear.api
+    geometry.work_zero.api geometry.alignment.api geometry.alignment.pictures_api
+    views.reports.api views.reports.jobs_api views.reports.points_api
+    quality.control_charts.api quality.control_charts.counts_api quality.control_charts.rules_api
+    quality.what_if.api quality.ledger.api quality.trial.api quality.sampling.api quality.temperature.api
+    quality.control_charts.signals_api
+    loop.readings.api:push
+    views.search.readings_api
+    loop.readings.aqdef.api loop.readings.table_api loop.readings.api loop.readings.by_hand.api loop.tools.api
+    loop.calibration.api
+    quality.gauge_studies.api
+    geometry.rotary_axes.protocol_api geometry.rotary_axes.plan_api geometry.rotary_axes.api
+    loop.tools.edges_api
+    geometry.geometric_form.api
+    loop.programs.api loop.tools.text_api loop.alarm_response.api
+    views.alarm_load.api
+    loop.reactions.api loop.quarantine.api loop.control_plan.api loop.present_context.api loop.notes.api
+    loop.notifications.api
+    access.events_api access.api
+    loop.machines.keys_api
+    access.keys_api access.screens_api access.audit.api
+    web.health web.api_docs
+    views.plant.machine_pages
+    loop.connections.pages loop.connections.touch_tests.pages
+    views.plant.pages views.plant.trying_pages views.station.pages views.search.pages views.to_do.pages
+    views.wall.pages views.compare.pages views.overview.pages views.shift.pages views.characteristic.pages
+    quality.control_charts.pages quality.control_charts.counts_pages quality.control_charts.rules_pages
+    quality.what_if.pages quality.ledger.pages quality.trial.pages quality.sampling.pages
+    quality.temperature.pages quality.control_charts.signals_pages
+    views.characteristic.capability_pages
+    views.characteristic.six_pack
+    views.alarm_load.pages
+    loop.reactions.pages loop.alarm_response.pages loop.quarantine.pages loop.control_plan.pages loop.notes.pages
+    views.approvals.pages
+    loop.tools.text_pages loop.tools.edge_pages loop.tools.pages loop.calibration.pages
+    quality.gauge_studies.pages
+    geometry.geometric_form.pages geometry.alignment.pages geometry.work_zero.pages geometry.rotary_axes.new_pages
+    geometry.rotary_axes.plan_pages geometry.rotary_axes.pages
+    access.pages
+    views.set_up.pages
+    loop.readings.importing.pages
+    quality.proof.pages
+    views.help.pages views.licences.pages views.reports.pages views.reports.jobs_pages
+"""
+"""The modules with routes, JSON first, in the order in which addresses are compared: the pages /alarms/load and /alarms/causes
+come before those of alarms by their number. A module brings its `router`, or what is named behind a colon."""
+
+
+def _router(name: str) -> APIRouter:
+    module, _colon, attribute = name.partition(":")
+    router: APIRouter = getattr(import_module(f"app.{module}"), attribute or "router")
+    return router
+
+
 # Each part of the shop floor brings its JSON routes (api) and its pages.
-ROUTERS: tuple[APIRouter, ...] = (
-    machines.router,
-    faults.router,
-    connections_api.router,
-    touch_tests_api.router,
-    characteristics.router,
-    expansion.router,
-    figures_api.router,
-    statistics.router,
-    capability.router,
-    compare.router,
-    overview.router,
-    shift.router,
-    search.router,
-    proof.router,
-    wear.router,
-    work_zero.router,
-    alignments.router,
-    alignment_pictures.router,
-    reports.router,
-    report_jobs.router,
-    report_points.router,
-    control.router,
-    counts_api.router,
-    rules_api.router,
-    what_if.router,
-    ledger.router,
-    trial.router,
-    sampling.router,
-    temperature.router,
-    signals_api.router,
-    readings.push,
-    reading_list.router,
-    aqdef_api.router,
-    table_api.router,
-    readings.router,
-    by_hand.router,
-    tools.router,
-    calibration.router,
-    gauge_studies.router,
-    rotary_axes_protocol.router,
-    plan_api.router,
-    rotary_axes.router,
-    edges_api.router,
-    geometric_form.router,
-    programs.router,
-    text_api.router,
-    alarms.router,
-    alarm_load.router,
-    reactions.router,
-    quarantine.router,
-    control_plan.router,
-    present_context_api.router,
-    notes.router,
-    notifications.router,
-    events_api.router,
-    people.router,
-    machine_keys.router,
-    keys_api.router,
-    screens_api.router,
-    audit.router,
-    health.router,
-    api_docs.router,
-    machine_pages.router,
-    connection_pages.router,
-    touch_test_pages.router,
-    plant_pages.router,
-    trying_pages.router,
-    station_pages.router,
-    search_pages.router,
-    to_do_pages.router,
-    wall_pages.router,
-    compare_pages.router,
-    overview_pages.router,
-    shift_pages.router,
-    characteristic_pages.router,
-    control_pages.router,
-    counts_pages.router,
-    rules_pages.router,
-    what_if_pages.router,
-    ledger_pages.router,
-    trial_pages.router,
-    sampling_pages.router,
-    temperature_pages.router,
-    signals_pages.router,
-    capability_pages.router,
-    six_pack.router,
-    alarm_load_pages.router,  # before the pages of alarms by their number
-    reaction_pages.router,  # /alarms/causes is no number of an alarm
-    alarm_pages.router,
-    quarantine_pages.router,
-    control_plan_pages.router,
-    note_pages.router,
-    queue_pages.router,
-    text_pages.router,
-    edge_pages.router,
-    tool_pages.router,
-    calibration_pages.router,
-    gauge_pages.router,
-    form_pages.router,
-    alignment_pages.router,
-    work_zero_pages.router,
-    new_run_pages.router,
-    plan_pages.router,
-    rotary_axes_pages.router,
-    sign_in_pages.router,
-    setup_pages.router,
-    import_pages.router,
-    proof_pages.router,
-    help_pages.router,
-    licence_pages.router,
-    report_pages.router,
-    report_job_pages.router,
-)
+ROUTERS = tuple(map(_router, WITH_ROUTES.split()))
 
 # What is done once a minute; see app.jobs.
 JOBS: tuple[PeriodicJob, ...] = (
