@@ -33,7 +33,7 @@ from app.bridge.file_rows import (
 )
 from app.bridge.file_settings import Settings
 from app.bridge.links import Received
-from app.bridge.patterns import LONGEST_LINE, Patterns, TooSlow
+from app.bridge.patterns import LONGEST_LINE, NotFound, Patterns, TooSlow
 from app.core.ring import INCH
 from app.errors import TooManyRequests
 from app.files.apart import apart, spend
@@ -288,9 +288,10 @@ class _Reader:
             try:
                 for fields in patterns.find(text.rstrip("\n")):
                     self._take(line, fields.get("characteristic", EVERY).strip(), fields, fields, self.settings.unit)
-            except TooSlow as error:
+            except NotFound as error:
                 self._fault(line, "", str(error))
-                return  # the next line would take as long
+                if isinstance(error, TooSlow):
+                    return  # the next line would take as long
 
     # --- AQDEF
 

@@ -18,7 +18,7 @@ from app.bridge import sources
 from app.bridge.configuration import Machine
 from app.bridge.fields import EVERY, Form, left_out_since, put, refuse_unknown
 from app.bridge.links import Misconfigured, Position, Received
-from app.bridge.patterns import LONGEST_LINE, Patterns, TooSlow, check_expressions
+from app.bridge.patterns import LONGEST_LINE, NotFound, Patterns, check_expressions
 from app.bridge.sources import Printing, Source, source_of
 from app.core.ring import INCH
 from app.files.formats.cell_values import Unreadable, zone_named
@@ -108,7 +108,7 @@ class TextLink(Printing[Line]):
             self._lines += 1
             try:
                 found = line.patterns.find(line.text[:LONGEST_LINE])
-            except TooSlow as error:
+            except NotFound as error:
                 yield self._refused(line, str(error))
                 continue
             self._found += len(found)

@@ -129,6 +129,32 @@ def test_what_is_wrong_goes_to_the_quarantine_with_its_line() -> None:
     assert printed(b"D99 ACTUAL 1.0\n", others="skip") == []
 
 
+@pytest.mark.parametrize(
+    ("line", "expression", "number"),
+    [
+        (b"D40 ACTUAL 40,001", r"ACTUAL +(?P<measured>[-\d.]+)", "'40' out of '40,001'"),
+        (b"D40 ACTUAL 40.001", r"ACTUAL +(?P<measured>\d+\.\d\d)", "'40.00' out of '40.001'"),
+        (b"D40 ACTUAL 40.001", r"ACTUAL.*(?P<measured>\d+\.\d+)", "'0.001' out of '40.001'"),
+        (b"D40 ACTUAL 4.0E+01", r"ACTUAL +(?P<measured>[-\d.]+)", "'4.0' out of '4.0E+01'"),
+    ],
+)
+def test_a_part_of_a_number_is_no_size(line: bytes, expression: str, number: str) -> None:
+    [found] = printed(line + b"\n", lines=(expression,))
+    assert number in str(found.fault)
+
+
+def test_what_an_expression_names_beside_the_size_is_no_part_of_it() -> None:
+    columns = Patterns((r"^(?P<part>\d{4})(?P<measured>\d+\.\d+)", r"^\w+;(?P<measured>[\d.]+),"))
+    assert [
+        each["measured"] for line in ("000140.001", "D;40.001,40.008", "D;40,1") for each in columns.find(line)
+    ] == [
+        "40.001",
+        "40.001",
+        "40",
+    ]
+    assert Patterns((r"(?P<measured>[\d.]+)",)).find("40.001,40.008")[0]["measured"] == "40.001"
+
+
 def test_an_expression_that_takes_for_ever_is_given_up(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("app.bridge.patterns.LONGEST_SEARCH", 0.05)
     slow = (r"^(?P<measured>(?:\d|\d\d)+)$",)
