@@ -8,6 +8,7 @@ from sqlalchemy import Select, and_, func, select
 from sqlalchemy.orm import Session
 
 from app.access.audit.tables import AuditEntry
+from app.core.calibration import Outcome
 from app.core.decision.limits import nanometres
 from app.core.decision.step import rounded
 from app.core.pairs import Comparison, compare
@@ -214,7 +215,10 @@ def targets(session: Session, machine: Machine, location: int) -> list[float]:
 
 
 def running_average(session: Session, machine: Machine, place: Place, value: float) -> float:
-    """A of the last gauge calibration, as long as the empirical value by which it was judged is in effect; else 0."""
+    """A of the last gauge calibration, as long as the empirical value by which it was judged is in effect; else 0.
+
+    One beyond R34 that nobody has accepted is passed over: it may have been another gauge.
+    """
     last = session.scalars(
         select(CalibrationRecord)
         .where(
@@ -223,6 +227,7 @@ def running_average(session: Session, machine: Machine, place: Place, value: flo
             CalibrationRecord.location == place.location,
             CalibrationRecord.refused.is_(False),
             CalibrationRecord.kind == "gauge",
+            CalibrationRecord.outcome != Outcome.FULL_DIFFERENCE,
         )
         .order_by(CalibrationRecord.number.desc())
         .limit(1)

@@ -115,6 +115,10 @@ class TestGauge:
         accept(shop, 3)
         after = calibrate(shop, touches=[199.852 + 0.004625 + 0.002], **limits)
         assert (after["average"], after["value_before"]) == (0.001, 0.004625)
+        another = calibrate(shop, touches=[200.3], **limits)
+        assert (another["reason"]["code"], another["status"]) == ("full_difference", "proposed")
+        nobody_took_it = calibrate(shop, touches=[199.852 + 0.004625 + 0.001], **limits)
+        assert (nobody_took_it["average"], nobody_took_it["proposed"]) == (0.001, None), "not half of another gauge"
 
     def test_by_itself_where_the_plan_says_so(self, shop: Shop) -> None:
         plan = f"/machines/{shop.machine}/averages/5/calibration-plan"
