@@ -90,6 +90,8 @@ HISTORY_BEGINS = datetime(1900, 1, 1, tzinfo=UTC)
 """No reading of a file is older."""
 AHEAD = timedelta(hours=24)
 """Of this server's clock; more is a wrong clock, or a wrong unit of the time."""
+MACHINED_AHEAD = timedelta(minutes=1)
+"""Of this server's clock; a part cut later than that would count as cut with corrections that it was cut without."""
 
 
 def _sensible(moment: datetime) -> datetime:

@@ -16,7 +16,7 @@ from msgspec import Meta, Struct
 from app.core.parameters import LARGEST_LENGTH
 from app.errors import FieldError, Invalid
 from app.language.i18n import _
-from app.web.fields import AHEAD, EARLIEST, HISTORY_BEGINS
+from app.web.fields import AHEAD, EARLIEST, HISTORY_BEGINS, MACHINED_AHEAD
 
 Length = Annotated[float, Meta(ge=-LARGEST_LENGTH, le=LARGEST_LENGTH)]
 Moment = Annotated[datetime, Meta(tz=True)]
@@ -365,7 +365,10 @@ def _sense(reading: ReadingIn, now: datetime, prefix: str, earliest: datetime = 
                 _("%(time)s lies before the year %(year)s. Check the machine's clock and the unit of the time.")
                 % {"time": moment.isoformat(), "year": earliest.year},
             )
-    if reading.measured_at and reading.machined_at and reading.machined_at > reading.measured_at:
+    if (cut := reading.machined_at) and now + MACHINED_AHEAD < cut <= now + AHEAD:
+        message = _("%(time)s is ahead of the server's clock. Set the machine's clock, or send correction_in_effect.")
+        yield FieldError(f"{prefix}machined_at", message % {"time": cut.isoformat()})
+    elif reading.measured_at and reading.machined_at and reading.machined_at > reading.measured_at:
         yield FieldError(
             f"{prefix}machined_at",
             _("A part cannot be measured before it is machined: machined_at lies after measured_at."),

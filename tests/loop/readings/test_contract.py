@@ -383,6 +383,15 @@ class TestTimes:
         answer = shop.read(0.0)
         assert answer["measured_at"] == answer["received_at"]
 
+    def test_a_part_that_is_here_was_not_cut_after_now(self, shop: Shop) -> None:
+        """A clock that is ahead would count each correction for parts that were cut without it."""
+        ahead = (datetime.now(UTC) + timedelta(hours=2)).isoformat()
+        for measured_at in (None, ahead):
+            problem = refused(shop, 422, machined_at=ahead, measured_at=measured_at)
+            assert fields(problem) == {"machined_at"}
+            assert "is ahead of the server's clock. Set the machine's clock" in problem["detail"]
+        assert shop.read(1.0, machined_at=(datetime.now(UTC) + timedelta(seconds=20)).isoformat())["sequence"] == 1
+
     @pytest.mark.parametrize(
         ("body", "field", "says"),
         [
