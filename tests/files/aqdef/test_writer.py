@@ -1,6 +1,7 @@
 """AQDEF files as they are written: what comes back, here and by a reader that others have written."""
 # ruff: noqa: DTZ001 - the files name no zone
 
+import re
 from datetime import datetime, timedelta
 from pathlib import Path
 from typing import Any
@@ -14,6 +15,8 @@ from app.core.natural import NaturalLimit
 from app.files.aqdef import description as aqdef
 from app.files.aqdef import values as aqdef_values
 from app.files.aqdef.description import Source
+from app.files.aqdef.fields import CATALOGUES as OF_A_FILE
+from app.files.aqdef.fields import FIELDS, ROW
 from app.files.aqdef.values import Measured, Value
 from app.files.aqdef.writer import MISSING, Catalogues, Described, Part, Validity, Written, write
 from tests.chance import examples
@@ -56,6 +59,20 @@ def values() -> list[Written]:
         Written(2, 8.005, BEGIN + second),
         Written(0, 39.999, BEGIN + second),
     ]  # fmt: skip
+
+
+def test_a_file_has_exactly_the_fields_that_the_table_calls_written(tmp_path: Path) -> None:
+    path = tmp_path / "out.dfq"
+    part = Part("08/15", "Shaft", "lathe-1", "Lathe 1", "Hall 2", "20")
+    seat = SEAT._replace(importance=2)
+    own = {"K0097": "{8e5c0f3a}"}
+    full = values()[0]._replace(batch="7", comment="chip", fields=own)
+    write(path, [part], [seat], [full], CATALOGUES)
+    head = {"K0100"} | {each.key for each in OF_A_FILE.values()}
+    found = set(re.findall(r"^(K\d{4})", path.read_text("cp1252"), flags=re.MULTILINE)) - head
+    in_the_row = set(ROW)
+    assert found | in_the_row == {key for key, field in FIELDS.items() if field.written}
+    assert found.isdisjoint(in_the_row)
 
 
 def test_what_is_written_is_read(tmp_path: Path) -> None:
