@@ -28,7 +28,7 @@ from app.access.tables import Badge, Person
 from app.db.engine import Database
 from app.errors import Conflict, InbandError, Invalid, NotFound, TooManyRequests
 from app.language.i18n import _
-from app.language.times import MINUTES, written
+from app.language.numbers import as_read
 
 SHORTEST_PIN, LONGEST_PIN = 4, 12
 SHORTEST_BADGE, LONGEST_BADGE = 6, 100
@@ -143,7 +143,7 @@ def _refuse_badge(failures: queries.Failures) -> None:
 
 def _until(now: datetime, left: int) -> str:
     """The first full minute after the wait."""
-    return written(now + timedelta(seconds=left + 59), MINUTES)
+    return as_read(now + timedelta(seconds=left + 59), "minutes")
 
 
 def set_pin(session: Session, caller: Caller, password: str, pin: str, keep_token: str | None) -> None:

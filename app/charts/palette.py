@@ -99,3 +99,19 @@ def shown(colour: Colour, theme: ThemeName) -> str:
     solid = PALETTES[theme][colour.role]
     red, green, blue = (int(solid[at : at + 2], 16) for at in (1, 3, 5))
     return f"rgba({red},{green},{blue},{colour.share})"
+
+
+ROLES = {colour: role for role, colour in reversed(PALETTES["light"].items())}
+
+
+def followed(colour: str) -> str:
+    """A colour of paper as a page writes it: by its name in `tokens.css`, which is another colour in the dark.
+
+    >>> followed("#5a646c"), followed("rgba(138,42,140,0.14)"), followed("#ffffff")
+    ('var(--quiet)', 'color-mix(in srgb, var(--wear) 14%, transparent)', 'var(--paper)')
+    """
+    if colour.startswith("rgba("):
+        *parts, share = colour[5:-1].split(",")
+        solid = "#" + "".join(f"{int(part):02x}" for part in parts)
+        return f"color-mix(in srgb, {followed(solid)} {100 * float(share):g}%, transparent)"
+    return f"var(--{ROLES[colour]})" if colour in ROLES else "var(--paper)"

@@ -1,8 +1,9 @@
-"""A drawing as SVG: attributes only, no styles, so that a strict policy of the page lets it in."""
+"""A drawing as SVG in a page, in the colours of its theme: attributes only, no styles, so that a strict policy lets it in."""
 
 from html import escape
 
 from app.charts.marks import Area, Dot, Drawing, Line, Mark, Words
+from app.charts.palette import followed
 
 
 def svg(drawing: Drawing, says: str, name: str) -> str:
@@ -29,7 +30,7 @@ def _mark(mark: Mark) -> str:
         case Line():
             dash = f' stroke-dasharray="{" ".join(f"{part:g}" for part in mark.dash)}"' if mark.dash else ""
             points = _points(mark.places)
-            return f'<polyline points="{points}" fill="none" stroke="{escape(mark.colour)}" stroke-width="{mark.width:g}"{dash}/>'
+            return f'<polyline points="{points}" fill="none" stroke="{followed(mark.colour)}" stroke-width="{mark.width:g}"{dash}/>'
         case Area():
             return f'<polygon points="{_points(mark.places)}"{_paint(mark)}/>'
         case Dot():
@@ -39,7 +40,7 @@ def _mark(mark: Mark) -> str:
             turned = f' transform="rotate(-90 {x:.1f} {y:.1f})"' if mark.turned else ""
             bold = ' font-weight="600"' if mark.bold else ""
             return (
-                f'<text x="{x:.1f}" y="{y:.1f}" font-size="{mark.size:g}" fill="{escape(mark.colour)}" '
+                f'<text x="{x:.1f}" y="{y:.1f}" font-size="{mark.size:g}" fill="{followed(mark.colour)}" '
                 f'text-anchor="{mark.anchor}"{bold}{turned}>{escape(mark.text)}</text>'
             )
 
@@ -49,5 +50,5 @@ def _points(places: tuple[tuple[float, float], ...]) -> str:
 
 
 def _paint(mark: Area | Dot) -> str:
-    edge = f' stroke="{escape(mark.edge)}" stroke-width="{mark.width:g}"' if mark.edge and mark.width else ""
-    return f' fill="{escape(mark.fill or "none")}"{edge}'
+    edge = f' stroke="{followed(mark.edge)}" stroke-width="{mark.width:g}"' if mark.edge and mark.width else ""
+    return f' fill="{followed(mark.fill) if mark.fill else "none"}"{edge}'

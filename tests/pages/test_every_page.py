@@ -1,5 +1,5 @@
 """Every page of the house, opened as people open it and looked at: no console error, no foreign request, nothing wider than
-the screen, nothing that axe finds, no pale words, targets as large as a finger beside the machine.
+the screen, tabs in one line on the smallest, nothing that axe finds, no pale words, targets as large as a finger beside the machine.
 
 The list is held against the routes of the application, so a new page is in it or the test fails.
 """
@@ -141,6 +141,7 @@ def test_a_page_is_in_order(
     resize(page, looks.sizes[0])
     page.emulate_media(color_scheme="light")
     opened(page, address.format(**values))
+    high = page.locator(".tabs").evaluate_all("all => all.filter((tabs) => tabs.clientHeight > 64).length")
     headings = page.locator("h1").count()
     wide = {}
     for size in looks.sizes:
@@ -155,7 +156,7 @@ def test_a_page_is_in_order(
         if found := small_targets(page):
             small[size] = found
     said, complaints[:] = complaints[:], []
-    assert (said, headings, wide, pale, axe, small) == ([], 1, {}, [], {}, {}), page.url
+    assert (said, headings, high, wide, pale, axe, small) == ([], 1, 0, {}, [], {}, {}), page.url
 
 
 PRINTED = {"/", "/overview", "/characteristics/{characteristic}"}

@@ -5,14 +5,14 @@ from datetime import datetime
 from typing import Any
 
 from app.language.i18n import _
-from app.language.times import MINUTES, written
+from app.language.numbers import as_read
 from app.loop.alarms.kinds import AlarmKind, register
 from app.loop.tables.alarms import Alarm
 
 
 def _since(alarm: Alarm, name: str) -> str:
     moment = alarm.data.get(name)
-    return written(datetime.fromisoformat(str(moment)), MINUTES) if moment else "–"
+    return as_read(datetime.fromisoformat(str(moment)), "minutes") if moment else "–"
 
 
 def _silent(alarm: Alarm) -> str:

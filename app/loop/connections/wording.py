@@ -13,7 +13,7 @@ CLOCK_LIMIT = 2.0
 show(
     State("connection_online", lambda: _("Online"), "steady", "applied"),
     State("connection_starting", lambda: _("Starting"), "waiting", "waiting"),
-    State("connection_control_away", lambda: _("Control away"), "attention", "no_data"),
+    State("connection_control_away", lambda: _("Control does not answer"), "attention", "no_data"),
     State("connection_wrong_machine", lambda: _("Wrong machine"), "stop", "rejected"),
     State("connection_counters_lost", lambda: _("Counters lost"), "stop", "alarm"),
     State("connection_full", lambda: _("Store is full"), "attention", "alarm"),

@@ -12,7 +12,7 @@ from app.access.callers import Caller
 from app.db.events import publish
 from app.errors import Conflict, Invalid, NotAllowed, NotFound
 from app.language.i18n import _
-from app.language.times import MINUTES, written
+from app.language.numbers import as_read
 from app.loop.characteristics.queries import CurrentCharacteristic, characteristic_named
 from app.loop.machines.queries import machine_named
 from app.loop.notes import queries
@@ -93,7 +93,7 @@ def withdraw_note(session: Session, number: int, reason: str, caller: Caller) ->
     if note.withdrawn_at is not None:
         raise Conflict(
             _("Note {number} was withdrawn by {name} at {at}.").format(
-                number=number, name=note.withdrawn_by, at=written(note.withdrawn_at, MINUTES)
+                number=number, name=note.withdrawn_by, at=as_read(note.withdrawn_at, "minutes")
             ),
             _("There is nothing left to do."),
         )

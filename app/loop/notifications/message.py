@@ -6,7 +6,7 @@ from datetime import datetime
 from typing import Any
 
 from app.language.i18n import _, ngettext
-from app.language.times import MINUTES, written
+from app.language.numbers import as_read
 from app.loop.alarm_response import wording
 from app.loop.alarm_response.queries import AlarmRow
 from app.loop.notifications.means import Message
@@ -52,7 +52,7 @@ def _in_words(row: AlarmRow, address: str) -> str:
     times = ngettext("{n} time", "{n} times", alarm.count).format(n=alarm.count)
     lines = (
         f"{wording.kind_word(alarm.kind)}: {_where(row)}",
-        f"{written(alarm.raised_at, MINUTES)}{f', {times}' if alarm.count > 1 else ''}",
+        f"{as_read(alarm.raised_at, 'minutes')}{f', {times}' if alarm.count > 1 else ''}",
         _sentence(row),
         wording.what_to_do(alarm.kind),
         _link(row, address),

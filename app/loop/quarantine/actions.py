@@ -14,8 +14,7 @@ from app.core.decision.step import rounded
 from app.db.events import publish
 from app.errors import Conflict, Invalid
 from app.language.i18n import _
-from app.language.numbers import um
-from app.language.times import MINUTES, written
+from app.language.numbers import as_read, um
 from app.loop.characteristics.queries import characteristic_named
 from app.loop.quarantine import queries, wording
 from app.loop.quarantine.queries import Listed, PartRow, QuarantineRow
@@ -127,7 +126,7 @@ def decide(
                 number=number,
                 status=wording.status_word(kept.status),
                 who=kept.decided_by,
-                at=written(kept.decided_at, MINUTES) if kept.decided_at else "–",
+                at=as_read(kept.decided_at, "minutes") if kept.decided_at else "–",
             ),
             _("There is nothing left to do."),
         )

@@ -1,7 +1,7 @@
 """Words of quarantines and affected parts."""
 
 from app.language.i18n import _
-from app.language.times import MINUTES, written
+from app.language.numbers import as_read
 from app.loop.quarantine.history import Known
 from app.loop.quarantine.queries import Between
 from app.loop.quarantine.tables import QuarantinedPart
@@ -36,7 +36,7 @@ def part_name(part: str | None, to: str | None = None) -> str:
 
 
 def _end(known: Known) -> str:
-    at = written(known.cut_at, MINUTES)
+    at = as_read(known.cut_at, "minutes")
     if known.part is None:
         return _("reading {number}, {at}").format(number=known.sequence, at=at)
     return _("{part} (reading {number}, {at})").format(part=known.part, number=known.sequence, at=at)
@@ -67,4 +67,4 @@ def decided(part: QuarantinedPart) -> str:
     """The decision about a part: by whom, when, why."""
     if part.decided_at is None:
         return ""
-    return _("{who}, {at}: {why}").format(who=part.decided_by, at=written(part.decided_at, MINUTES), why=part.reason)
+    return _("{who}, {at}: {why}").format(who=part.decided_by, at=as_read(part.decided_at, "minutes"), why=part.reason)

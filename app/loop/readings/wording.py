@@ -12,7 +12,7 @@ from app.core.parameters import Feature, Parameters
 from app.core.plausibility import looks_like_inches, looks_like_micrometres
 from app.core.probing import TouchError, Touches, measured_value
 from app.language.i18n import _, ngettext
-from app.language.numbers import MINUS, decimals_beside, deserved
+from app.language.numbers import decimals_beside, deserved, fixed, signed
 from app.loop.readings.records import MOST_OUTSTANDING, Record
 
 NAMED_AT_MOST = 3
@@ -110,12 +110,10 @@ class _ReadValues(_Values):
                 usual,
                 *(round(side * limit * 1000, 6) for limit in limits if limit is not None for side in (1, -1)),
             )
-            return _in_um(value, max(decimals, 1) if round(value, decimals) == 0 != value else decimals)
-        return _in_um(value, usual if round(value, usual) == value else usual + 1)
-
-
-def _in_um(value: float, decimals: int) -> str:
-    return f"{MINUS if round(value, decimals) < 0 else ''}{abs(value):.{decimals}f} µm"
+            decimals = max(decimals, 1) if round(value, decimals) == 0 != value else decimals
+        else:
+            decimals = usual if round(value, usual) == value else usual + 1
+        return f"{signed(value, decimals) if name in _SIGNED else fixed(value, decimals)} µm"
 
 
 def _of_reading(name: str) -> Callable[[Record, Parameters], Any]:
@@ -149,6 +147,7 @@ _WORDED: dict[str, Callable[[Record, Parameters], float | int | None]] = {
     "location": _of_parameters("average_memory"),
 }
 _MEASURED = ("deviation", "raw", "worn", "average", "averaged", "decided")
+_SIGNED = (*_MEASURED, "value")
 
 
 def first_move_sentence(feature: str | None) -> str:

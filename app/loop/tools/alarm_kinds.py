@@ -3,8 +3,7 @@
 from datetime import datetime
 
 from app.language.i18n import _, ngettext
-from app.language.numbers import PLUS_MINUS, fixed, mm, signed, um, um_limit
-from app.language.times import MINUTES, written
+from app.language.numbers import PLUS_MINUS, as_read, fixed, mm, signed, um, um_limit
 from app.loop.alarms.kinds import AlarmKind, register
 from app.loop.alarms.reading_kinds import moved_by
 from app.loop.tables.alarms import Alarm
@@ -114,7 +113,7 @@ def _not_taken(alarm: Alarm) -> str:
             tool=alarm.tool_memory, reason=data["reason"]
         )
     count = int(data.get("waiting") or 1)
-    since = written(datetime.fromisoformat(str(data["since"])), MINUTES) if data.get("since") else "–"
+    since = as_read(datetime.fromisoformat(str(data["since"])), "minutes") if data.get("since") else "–"
     return ngettext(
         "The machine does not take correction {first} of tool {tool}, which waits since {since}. Parts are cut with the offset "
         "of before.",

@@ -7,6 +7,7 @@ from app.quality.wear.wording import hunting_word
 from app.views.characteristic.wording import state_word
 from app.views.overview.queries import Ranked
 from app.views.overview.ranking import AttentionReason
+from app.web.states import tone_of
 
 
 class Reason(NamedTuple):
@@ -40,8 +41,8 @@ def _reason(reason: AttentionReason, ranked: Ranked) -> Reason:
     state = state_word(inputs.state)
     parts = max(0, round(inputs.parts_left or 0))
     text, href, tone = {
-        AttentionReason.STOPPED: (state, board, "stop"),
-        AttentionReason.OUTSIDE: (state, page, "attention"),
+        AttentionReason.STOPPED: (state, board, tone_of(inputs.state)),
+        AttentionReason.OUTSIDE: (state, page, tone_of(inputs.state)),
         AttentionReason.ALARM: (
             ngettext("%(num)s active alarm", "%(num)s active alarms", inputs.alarms) % {"num": inputs.alarms},
             board,

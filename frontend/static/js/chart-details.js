@@ -1,6 +1,6 @@
 // Words of a chart that are details (named so in the figure) are given up where they would lie over the words beside them: in a low chart.
 
-const LEAST = 11; // px from line to line
+const LEAST = 12; // px from line to line
 
 export function withoutCrowded(plot) {
   const giveUp = () => {

@@ -46,4 +46,8 @@ document.addEventListener("submit", (event) => {
 window.addEventListener("pageshow", () => document.querySelectorAll("form[data-sent]").forEach((form) => delete form.dataset.sent));
 
 for (const dialog of document.querySelectorAll("dialog[data-open]")) dialog.showModal();
+for (const chosen of document.querySelectorAll(".tabs > [aria-current]")) { // on a narrow screen the tabs are one line that is swiped
+  const [line, tab] = [chosen.parentElement.getBoundingClientRect(), chosen.getBoundingClientRect()];
+  chosen.parentElement.scrollLeft += tab.x + tab.width / 2 - line.x - line.width / 2;
+}
 document.querySelector("dialog[open] [aria-invalid], main [aria-invalid]")?.focus();

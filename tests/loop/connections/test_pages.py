@@ -26,7 +26,7 @@ def test_the_list_says_how_each_stands(shop: Shop, viewer: Person) -> None:
     assert "−7200.0 s" in row
     assert 'data-tone="attention"' in row
     assert "haas" in row
-    assert "Control away" in page
+    assert "Control does not answer" in page
     assert "On hold" in page
     home = viewer.open(f"/machines/{shop.machine}")
     assert "Bridge heard" in home

@@ -23,11 +23,11 @@ def said(deviation: float, code: str, **changed: float) -> tuple[str, str]:
 @pytest.mark.parametrize(
     ("deviation", "code", "changed", "exact", "read"),
     [
-        (406.575, "probe_fault", {"tolerance_width": 0.3, "confidence_limit": 0.4}, "406.575 µm", "407 µm"),
-        (6.128, "full_deviation", {}, "6.128 µm", "6.1 µm"),
-        (5.04, "full_deviation", {}, "5.04 µm", "5.04 µm"),  # 5.0 would not lie beyond the limit of 5.0
+        (406.575, "probe_fault", {"tolerance_width": 0.3, "confidence_limit": 0.4}, "406.575 µm", "+407 µm"),
+        (6.128, "full_deviation", {}, "6.128 µm", "+6.1 µm"),
+        (5.04, "full_deviation", {}, "5.04 µm", "+5.04 µm"),  # 5.0 would not lie beyond the limit of 5.0
         (-5.333, "full_deviation", {"averaging_limit": 0.0053333}, "5.333 µm", "5.33 µm"),
-        (2.128, "full_deviation", {"tolerance_width": 0.004, "averaging_limit": 0.0015}, "2.128 µm", "2.13 µm"),
+        (2.128, "full_deviation", {"tolerance_width": 0.004, "averaging_limit": 0.0015}, "2.128 µm", "+2.13 µm"),
     ],
 )
 def test_the_tolerance_says_how_many_decimals(
@@ -36,6 +36,7 @@ def test_the_tolerance_says_how_many_decimals(
     answered, shown = said(deviation, code, **changed)
     assert exact in answered
     assert read in shown
+    assert "limit +" not in shown
 
 
 def test_pages_show_it_and_answers_stay_exact(shop: Shop, viewer: Person) -> None:
@@ -43,7 +44,7 @@ def test_pages_show_it_and_answers_stay_exact(shop: Shop, viewer: Person) -> Non
     assert answer["reason"] == shop.call("GET", f"/readings/{shop.characteristic}/1")["reason"]
     assert "6.128 µm" in answer["reason"]["text"]
     page = viewer.open(f"/characteristics/{shop.characteristic}/readings/1")
-    assert "Deviation 6.1 µm" in page
+    assert "Deviation +6.1 µm" in page
     assert "6.128 µm" not in page
 
 

@@ -44,7 +44,7 @@ class TestWithoutScripts:
         number = shop.read(6.1)["correction"]["number"]
         text = viewer.open(path(shop))
         assert re.findall(r'id="reading-(\d+)"', text) == ["2", "1"]
-        assert "Deviation 6.1 µm is beyond the averaging limit 5.0 µm: corrected in full." in text
+        assert "Deviation +6.1 µm is beyond the averaging limit 5.0 µm: corrected in full." in text
         assert f"Correction {number}" in text
         assert "−6.1\xa0µm" in text
         assert "version 1" in text

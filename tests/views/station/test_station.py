@@ -149,7 +149,7 @@ class TestWithoutScripts:
     def test_a_tool_is_changed(self, shop: Shop, operator: Person) -> None:
         shop.read(6.0)
         here = f"/station/{shop.machine}/tools/3/change"
-        assert "Tool 3 was changed?" in operator.open(here)
+        assert "Was tool 3 changed?" in operator.open(here)
         assert "Offset" in operator.send(here, 422, offset="wide", reason="New insert")
         assert "Tool 3 starts a new life" in operator.send(here, offset="0,01", reason="New insert")
         assert shop.tool()["offset"] == 0.01
