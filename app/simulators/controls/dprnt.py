@@ -67,14 +67,7 @@ class PrintingSimulator:
 
     def table(self) -> dict[str, object]:
         """The table of a machine in the configuration."""
-        return {
-            "kind": "dprnt",
-            "unit": "inch" if self.model.unit == Unit.INCH else "mm",
-            "secret_file": "machine.key",
-            "corrections": "none",
-            "dprnt": {"connect": f"127.0.0.1:{self.port}"},
-            "characteristics": {str(each.number): f"characteristic-{each.number}" for each in self.model.features},
-        }
+        return self.model.table("dprnt", {"connect": f"127.0.0.1:{self.port}"}, corrections="none")
 
     async def _serve(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
         self._writers.add(writer)

@@ -9,7 +9,7 @@ import contextlib
 import re
 
 from app.bridge.kinds.haas import DATE, PARAMETERS, TIME_OF_DAY
-from app.core.ring import SIZE, Unit
+from app.core.ring import SIZE
 from app.simulators.controls.model import Feature, Model
 
 FEATURES = (Feature(register="wear_length", parameter=PARAMETERS["wear_length"]),)
@@ -53,19 +53,10 @@ class HaasSimulator:
 
     def table(self) -> dict[str, object]:
         """The table of a machine in the configuration."""
-        return {
-            "kind": "haas",
-            "unit": "inch" if self.model.unit == Unit.INCH else "mm",
-            "secret_file": "machine.key",
-            "identity": self.model.serial,
-            "proof_needed": False,
-            "haas": {"address": "127.0.0.1", "port": self.port, "first_register": self.first},
-            "characteristics": {str(each.number): f"characteristic-{each.number}" for each in self.model.features},
-            "location": [
-                {"tool_memory": each.tool, "tool": each.tool, "register": each.register, "holds": each.holds}
-                for each in self.model.places
-            ],
-        }
+        reached: dict[str, object] = {"address": "127.0.0.1", "port": self.port, "first_register": self.first}
+        return self.model.table(
+            "haas", reached, identity=self.model.serial, proof_needed=False, location=self.model.locations
+        )
 
     async def _serve(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
         if len(self._clients) >= CONNECTIONS:

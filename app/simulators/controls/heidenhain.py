@@ -158,19 +158,13 @@ class TncSimulator:
 
     def table(self) -> dict[str, object]:
         """The table of a machine in the configuration."""
-        return {
-            "kind": "heidenhain",
-            "unit": "inch" if self.model.unit == Unit.INCH else "mm",
-            "secret_file": "machine.key",
-            "identity": f"TNC640 {self.model.serial}",
-            "proof_needed": False,
-            "heidenhain": {"address": "127.0.0.1", "port": self.port},
-            "characteristics": {str(each.number): f"characteristic-{each.number}" for each in self.model.features},
-            "location": [
-                {"tool_memory": each.tool, "tool": each.tool, "register": each.register, "holds": each.holds}
-                for each in self.model.places
-            ],
-        }
+        return self.model.table(
+            "heidenhain",
+            {"address": "127.0.0.1", "port": self.port},
+            identity=f"TNC640 {self.model.serial}",
+            proof_needed=False,
+            location=self.model.locations,
+        )
 
     async def _serve(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
         self._writers.add(writer)

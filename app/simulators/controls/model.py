@@ -139,6 +139,27 @@ class Model:
         named = {_place(each): each for each in self.every if len(self.features) < len(OWNERS) or each.tool != UNMAPPED}
         return tuple(named.values())
 
+    # --- the configuration of the bridge
+
+    def table(self, kind: str, reached: dict[str, object], **more: object) -> dict[str, object]:
+        """The table of this machine. reached: settings of the kind, by which it is reached."""
+        return {
+            "kind": kind,
+            "unit": "inch" if self.unit == Unit.INCH else "mm",
+            "secret_file": "machine.key",
+            **more,
+            kind: reached,
+            "characteristics": {str(each.number): f"characteristic-{each.number}" for each in self.features},
+        }
+
+    @property
+    def locations(self) -> list[dict[str, object]]:
+        """The locations of its tools."""
+        return [
+            {"tool_memory": each.tool, "tool": each.tool, "register": each.register, "holds": each.holds}
+            for each in self.places
+        ]
+
     # --- the NC program
 
     def part(self) -> Steps:

@@ -68,18 +68,9 @@ class MqttSimulator:
 
     def table(self) -> dict[str, object]:
         """The table of a machine in the configuration."""
-        return {
-            "kind": "mqtt",
-            "unit": "inch" if self.model.unit == Unit.INCH else "mm",
-            "secret_file": "machine.key",
-            "proof_needed": False,
-            "mqtt": {"host": self.host, "port": self.port, "name": self.name},
-            "characteristics": {str(each.number): f"shaft-{each.number}" for each in self.model.features},
-            "location": [
-                {"tool_memory": each.tool, "tool": each.tool, "register": each.register, "holds": each.holds}
-                for each in self.model.places
-            ],
-        }
+        settings: dict[str, object] = {"host": self.host, "port": self.port, "name": self.name}
+        table = self.model.table("mqtt", settings, proof_needed=False, location=self.model.locations)
+        return table | {"characteristics": {str(each.number): f"shaft-{each.number}" for each in self.model.features}}
 
     async def _run(self) -> None:
         while True:
