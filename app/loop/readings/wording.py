@@ -12,10 +12,11 @@ from app.core.parameters import Feature, Parameters
 from app.core.plausibility import looks_like_inches, looks_like_micrometres
 from app.core.probing import TouchError, Touches, measured_value
 from app.language.i18n import _, ngettext
-from app.language.numbers import decimals_beside, deserved, fixed, signed
+from app.language.numbers import age, decimals_beside, deserved, fixed, signed
 from app.loop.readings.records import MOST_OUTSTANDING, Record
 
 NAMED_AT_MOST = 3
+LONG_BEFORE = 900  # s between cutting and receipt, of which the machine's clock may be the cause
 UNBELIEVABLE = (Code.PROBE_FAULT, Code.TOUCH_FAULT, Code.BEYOND_NATURAL_LIMIT)
 
 
@@ -256,16 +257,28 @@ def _touch_fault(parameters: Parameters, touches: Touches | None) -> str:
     return f"{about} {_stopped()}"
 
 
+def _lag(record: Record) -> str:
+    """Return the sentence on the time between cutting and receipt, where a clock alone says what the part was cut without."""
+    lag = 0.0 if record.machined_at is None else (record.received_at - record.machined_at).total_seconds()
+    if record.correction_in_effect is not None or lag < LONG_BEFORE:
+        return ""
+    return " " + _(
+        "By its machined_at it was cut %(age)s before it came in: if the machine's clock is behind, corrections that were applied "
+        "since then were in effect."
+    ) % {"age": age(lag)}
+
+
 def _note(code: str, values: _Values) -> str:
     match code:
         case "outstanding":
             outstanding = values.record.outstanding or ()
             numbers = _listed(outstanding)
-            return ngettext(
+            text = ngettext(
                 "The part was cut before correction %(numbers)s took effect: its deviation of %(raw)s counts as %(decided)s.",
                 "The part was cut before corrections %(numbers)s took effect: its deviation of %(raw)s counts as %(decided)s.",
                 len(outstanding),
-            ) % {"numbers": numbers, "raw": values["raw"], "decided": values["decided"]}
+            )
+            return text % {"numbers": numbers, "raw": values["raw"], "decided": values["decided"]} + _lag(values.record)
         case "corrections_of_tool":
             return (
                 _(

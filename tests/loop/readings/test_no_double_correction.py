@@ -219,6 +219,10 @@ class TestByMachinedAt:
         assert (before["decided_deviation"], before["outstanding"]) == (0.0, [1])
         after = shop.read(1.0, machined_at=at(3), measured_at=at(5))
         assert (after["decided_deviation"], after["outstanding"]) == (0.001, [])
+        assert "machined_at" not in before["reason"]["text"]
+        slow = shop.read(1.0, machined_at=at(-130))
+        assert slow["outstanding"] == [1]
+        assert "By its machined_at it was cut 2 h" in slow["reason"]["text"], "a clock that is behind is named"
 
 
 class TestApproval:
