@@ -40,7 +40,6 @@ from tests.db.first_program import make_first_program
 from tests.forked import Forked
 from tests.server_logs import follow, pytest_runtest_makereport, pytest_runtest_setup  # noqa: F401 - hooks of pytest
 from tests.shop import KEY, Person, Shop
-from tests.visits import Visits
 
 for name in [name for name in os.environ if name.startswith(("INBAND_", "PG")) and name != "INBAND_TEST_CITUS"]:
     del os.environ[name]  # no test may meet a real installation
@@ -107,8 +106,6 @@ BROWSER_OPTIONS = [
     "--disable-component-update",
     "--disable-sync",
     "--no-first-run",
-    "--renderer-process-limit=1",  # one for all pages of a context: see tests.visits
-    "--js-flags=--single-threaded",  # all cores are busy
 ]
 
 
@@ -561,12 +558,6 @@ def browser(playwright: Playwright) -> Iterator[Browser]:
     running.close()
 
 
-@pytest.fixture(scope="session")
-def visits(browser: Browser) -> Visits:
-    """Pages of this browser."""
-    return Visits(browser)
-
-
 def _works(program: str) -> bool:
     """Some systems have a stand-in that only says how to get the real thing."""
     return subprocess.run([program, "--version"], capture_output=True).returncode == 0
@@ -585,8 +576,8 @@ def screen() -> dict[str, Any]:
 
 
 @contextmanager
-def new_page(visits: Visits, url: str, complaints: list[str], **screen: Any) -> Iterator[Page]:
-    """A page of the server at `url` for somebody new; console errors and requests to any other host are complaints."""
+def new_page(browser: Browser, url: str, complaints: list[str], **screen: Any) -> Iterator[Page]:
+    """A page of the server at `url`, in a context of its own; console errors and requests to any other host are complaints."""
     host = urlsplit(url).netloc
 
     def look(request: Request) -> None:
@@ -594,22 +585,24 @@ def new_page(visits: Visits, url: str, complaints: list[str], **screen: Any) -> 
         if parts.scheme not in {"data", "blob", "about"} and parts.netloc != host:
             complaints.append(f"request to a foreign host: {request.url}")
 
-    with visits.page(url, **screen) as opened:
-        opened.context.on("request", look)
-        opened.on("pageerror", lambda error: complaints.append(f"uncaught in {opened.url}: {error}"))
-        opened.on(
-            "console",
-            lambda message: (
-                complaints.append(f"console in {opened.url}: {message.text}") if message.type == "error" else None
-            ),
-        )
-        yield opened
-        opened.context.remove_listener("request", look)
+    context = browser.new_context(base_url=url, locale="en-GB", **screen)
+    context.on("request", look)
+    opened = context.new_page()
+    opened.set_default_timeout(60_000)
+    opened.on("pageerror", lambda error: complaints.append(f"uncaught in {opened.url}: {error}"))
+    opened.on(
+        "console",
+        lambda message: (
+            complaints.append(f"console in {opened.url}: {message.text}") if message.type == "error" else None
+        ),
+    )
+    yield opened
+    context.close()
 
 
 @pytest.fixture
-def page(visits: Visits, server: Server, complaints: list[str], screen: dict[str, Any]) -> Iterator[Page]:
+def page(browser: Browser, server: Server, complaints: list[str], screen: dict[str, Any]) -> Iterator[Page]:
     """A page of the server; what it complains about fails the test."""
-    with new_page(visits, server.url, complaints, **screen) as opened:
+    with new_page(browser, server.url, complaints, **screen) as opened:
         yield opened
     assert not complaints, "\n".join(complaints)

@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 from urllib.parse import urlsplit
 
 import pytest
-from playwright.sync_api import Page, expect
+from playwright.sync_api import Browser, Page, expect
 from pypdf import PdfReader
 
 from app.access import devices
@@ -28,7 +28,6 @@ from tests.pages.looks import (
     violations,
 )
 from tests.shop import Person, Shop
-from tests.visits import Visits
 
 pytestmark = pytest.mark.own_server  # pages of the whole plant show this house and nothing else
 
@@ -121,10 +120,10 @@ def values(house: Shop) -> dict[str, Any]:
 
 
 @pytest.fixture(scope="module")
-def visitor(visits: Visits, server: Server, admin: Person) -> Iterator[tuple[Page, list[str]]]:
+def visitor(browser: Browser, server: Server, admin: Person) -> Iterator[tuple[Page, list[str]]]:
     """The one browser in which somebody goes from page to page, and what it complained about."""
     complaints: list[str] = []
-    with new_page(visits, server.url, complaints, viewport={"width": 1280, "height": 800}) as page:
+    with new_page(browser, server.url, complaints) as page:
         admin.sign_in(page)
         yield page, complaints
 

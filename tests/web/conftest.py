@@ -9,10 +9,9 @@ from dataclasses import dataclass
 import httpx
 import pytest
 import uvicorn
-from playwright.sync_api import Page
+from playwright.sync_api import Browser, Page
 
 from tests.conftest import TLS, free_port
-from tests.visits import Visits
 from tests.web.showcase import Stage, showcase
 
 
@@ -65,7 +64,7 @@ OpenPage = Callable[..., AbstractContextManager[Page]]
 
 
 @pytest.fixture
-def open_page(visits: Visits, show: Show) -> OpenPage:
+def open_page(browser: Browser, show: Show) -> OpenPage:
     """``with open_page("/", width, height, theme) as page``: fails on console errors (but those with `forgive` in
     them), violations of the policy and foreign requests."""
 
@@ -79,19 +78,21 @@ def open_page(visits: Visits, show: Show) -> OpenPage:
         **options: object,
     ) -> Iterator[Page]:
         complaints: list[str] = []
-        with visits.page(show.url, viewport={"width": width, "height": height}, **options) as page:
-            page.context.add_cookies([{"name": "inband_theme", "value": theme, "url": show.url}])
-            page.add_init_script(
-                "document.addEventListener('securitypolicyviolation', (e) => console.error('policy: ' + e.violatedDirective))"
-            )
-            page.on("console", lambda m: complaints.append(m.text) if m.type in {"error", "warning"} else None)
-            page.on("pageerror", lambda error: complaints.append(str(error)))
-            page.on(
-                "request",
-                lambda r: None if r.url.startswith((show.url, "data:", "blob:")) else complaints.append(r.url),
-            )
-            page.goto(path)
-            yield page
+        context = browser.new_context(viewport={"width": width, "height": height}, locale="en-GB", **options)  # type: ignore[arg-type]
+        context.add_cookies([{"name": "inband_theme", "value": theme, "url": show.url}])
+        context.add_init_script(
+            "document.addEventListener('securitypolicyviolation', (e) => console.error('policy: ' + e.violatedDirective))"
+        )
+        context.set_default_timeout(60_000)
+        page = context.new_page()
+        page.on("console", lambda m: complaints.append(m.text) if m.type in {"error", "warning"} else None)
+        page.on("pageerror", lambda error: complaints.append(str(error)))
+        page.on(
+            "request", lambda r: None if r.url.startswith((show.url, "data:", "blob:")) else complaints.append(r.url)
+        )
+        page.goto(show.url + path)
+        yield page
+        context.close()
         complaints = [words for words in complaints if forgive is None or forgive not in words]
         assert not complaints, "\n".join(complaints)
 
