@@ -75,11 +75,16 @@ def group_of(session: Session, machine: Machine, tool: int) -> Group | None:
     return next((group for group in _of_machine(session, machine) if group.tool.number == tool), None)
 
 
-def to_enter(session: Session, machine: Machine) -> list[Waiting]:
-    """Pending corrections that a person enters at the control, the oldest first: the machine has neither a key nor a bridge."""
+def to_enter(session: Session, machine: Machine, limit: int) -> tuple[list[Waiting], int]:
+    """Pending corrections that a person enters at the control, the oldest first, and how many there are.
+
+    There are none where the machine has a key or a bridge.
+    """
     if session.get(Connection, machine.id) is not None or keys.keys_by_machine(session).get(machine.id):
-        return []
-    return _with_readings(session, machine, queries.corrections(session, machine, statuses=("pending",), limit=MOST))
+        return [], 0
+    rows = queries.corrections(session, machine, statuses=("pending",), limit=limit)
+    count = queries.open_counts(session)[machine.id].get("pending", 0) if len(rows) == limit else len(rows)
+    return _with_readings(session, machine, rows), count
 
 
 def _of_machine(session: Session, machine: Machine) -> list[Group]:

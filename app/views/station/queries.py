@@ -17,6 +17,7 @@ from app.views.characteristic import state_queries
 from app.views.characteristic.state_queries import CharacteristicRow
 
 MOST_ALARMS = 20
+FEW = 2  # corrections that wait, of which more are a number
 URGENCY = {state: place for place, state in enumerate(CharacteristicState)}
 
 
@@ -24,7 +25,8 @@ class Station(NamedTuple):
     """Content of the station of a machine: `first` in giant digits, the `others` small; active alarms, the most urgent first.
 
     tools: the tools that its characteristics are cut with. waiting: corrections to decide about that no active alarm holds, and those to enter
-    at the control, the oldest first; together: of the tools of which several await approval, what approving all of them comes to.
+    at the control, the oldest few; more: those behind them; together: of the tools of which several await approval, what approving all of
+    them comes to.
     """
 
     machine: Machine
@@ -34,6 +36,7 @@ class Station(NamedTuple):
     active: int
     tools: Sequence[int]
     waiting: Sequence[Waiting]
+    more: int
     together: Sequence[Group]
 
 
@@ -43,7 +46,10 @@ def station(session: Session, machine: str) -> Station:
     rows = sorted(group.rows, key=_place)
     first = rows[0] if rows else None
     active = alarms.alarms(session, state="active", machine_id=group.machine.id, limit=MOST_ALARMS, by_urgency=True)
-    waiting = approvals.groups(session, group.machine)
+    tools = approvals.groups(session, group.machine)
+    deciding = [each for tool in tools for each in tool.waiting if each.alarm is None]
+    entering, number_entering = approvals.to_enter(session, group.machine, FEW)
+    waiting = sorted([*deciding, *entering], key=lambda each: each.row.correction.number)[:FEW]
     return Station(
         group.machine,
         first,
@@ -51,14 +57,9 @@ def station(session: Session, machine: str) -> Station:
         active,
         alarms.active_count(session, group.machine.id),
         sorted({row.parameters.tool_memory for row in rows if row.parameters.tool_memory}),
-        sorted(
-            [
-                *(each for tool in waiting for each in tool.waiting if each.alarm is None),
-                *approvals.to_enter(session, group.machine),
-            ],
-            key=lambda each: each.row.correction.number,
-        ),
-        [tool for tool in waiting if len(tool.approvable) > 1],
+        waiting,
+        len(deciding) + number_entering - len(waiting),
+        [tool for tool in tools if len(tool.approvable) > 1],
     )
 
 

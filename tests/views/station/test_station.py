@@ -63,6 +63,11 @@ class TestWithoutScripts:
         assert "Correction pending" in operator.open(f"/characteristics/{key}")
         operator.send(f"{here}/corrections/1", do="applied")
         assert '<p class="station-action">Nothing to do</p>' in operator.open(here)
+        assert [shop.read(each, key)["correction"]["number"] for each in (6.0, 12.0, 18.0)] == [2, 3, 4]
+        text = operator.open(here)
+        assert f"{here}/corrections/3?do=applied" in text
+        assert f"{here}/corrections/4?" not in text
+        assert "1 more correction waits" in text
 
     def test_a_correction_is_approved_or_rejected(self, shop: Shop, operator: Person, viewer: Person) -> None:
         key = f"{shop.characteristic}-approval"
