@@ -348,8 +348,7 @@ def _sense(reading: ReadingIn, now: datetime, prefix: str, earliest: datetime = 
             f"{prefix}context", _("This text holds control characters; send letters, digits and signs only.")
         )
     for name in ("measured_at", "machined_at"):
-        moment = getattr(reading, name)
-        if moment is None:
+        if (moment := getattr(reading, name)) is None:
             continue
         if moment > now + AHEAD:
             yield FieldError(
@@ -365,7 +364,8 @@ def _sense(reading: ReadingIn, now: datetime, prefix: str, earliest: datetime = 
                 _("%(time)s lies before the year %(year)s. Check the machine's clock and the unit of the time.")
                 % {"time": moment.isoformat(), "year": earliest.year},
             )
-    if (cut := reading.machined_at) and now + MACHINED_AHEAD < cut <= now + AHEAD:
+    cut = reading.machined_at if reading.correction_in_effect is None else None  # the number wins
+    if cut and now + MACHINED_AHEAD < cut <= now + AHEAD:
         message = _("%(time)s is ahead of the server's clock. Set the machine's clock, or send correction_in_effect.")
         yield FieldError(f"{prefix}machined_at", message % {"time": cut.isoformat()})
     elif reading.measured_at and reading.machined_at and reading.machined_at > reading.measured_at:

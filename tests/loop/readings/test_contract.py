@@ -391,6 +391,7 @@ class TestTimes:
             assert fields(problem) == {"machined_at"}
             assert "is ahead of the server's clock. Set the machine's clock" in problem["detail"]
         assert shop.read(1.0, machined_at=(datetime.now(UTC) + timedelta(seconds=20)).isoformat())["sequence"] == 1
+        assert shop.read(1.0, machined_at=ahead, correction_in_effect=0)["sequence"] == 2, "the number wins"
 
     @pytest.mark.parametrize(
         ("body", "field", "says"),
