@@ -243,7 +243,7 @@ class TestWhoActs:
         for _try in range(FREE):
             tablet.acknowledge(401, other_name=milica.name, pin="9999")
         text = tablet.acknowledge(429, other_name=milica.name, pin=PIN)
-        assert re.search(r"The PIN is locked on this device until \d{4}-\d\d-\d\d \d\d:\d\d", text)
+        assert re.search(r"The PIN is locked on this device until \d\d? \w{3} \d{4} \d\d:\d\d", text)
         Tablet(server, tablet.shop).acknowledge(other_name=milica.name, pin=PIN)  # not on another one
         assert tablet.shop.alarms() == []
 
