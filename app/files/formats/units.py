@@ -88,10 +88,11 @@ _SCALED: Final = re.compile(
     + rf"""|(?:\b(?:in|u|v|в|у)\s+|[\[(=:]\s*)\d+(?:[.,]\d+)?\s*{_LENGTH}(?!\w)
     |(?<![\d.,±])(?<!±\s)(?:0?[.,]0*1\s*(?:inch|in|["″])|0?[.,]001\s*mm)(?!\w)|(?<!\d\s)(?<=[\s(\[_])[x×*]\s?10{{2,}}\b|\b10\s*(?:\^|⁻)
     |\b{_LENGTH}\s*(?:\^\s*[23]|[²³])|\b{_LENGTH}\s*/\s*(?:s|min|rev|h|mm?|K|°C)\b|\bsq\.?\s*(?:mm|in)\b
-    |\b{_LENGTH}\s*(?:or|oder|ili|ou|[,/|])\s*{_LENGTH}(?!\w)""",
+    |\b{_LENGTH}\s*(?:or|oder|ili|ou|[,/|])\s*{_LENGTH}(?!\w)
+    |\[\s*[x×*]?\s*(?:1?e[-+]?\d+|0?[.,]0*1|10{{3,}})\s*\]""",
     re.IGNORECASE | re.VERBOSE,
 )
-"""The same in a name, and what is no length or either of two: *mm²*, *mm/min*, *mm or in*."""
+"""The same in a name, a factor alone (*[0.001]*), and what is no length or either of two: *mm²*, *mm/min*, *mm or in*."""
 _TOLERANCE: Final = re.compile(r"(?<![\w.,])\d+(?:[.,]\d+)?\s*(?:[uµμ]m|microns?)(?!\w)")
 """Such as the 5 µm of *Run-out 5 µm*, a tolerance rather than the unit of the sizes."""
 _OTHERS: Final = frozenset(
@@ -110,8 +111,9 @@ _OTHER_AT_END: Final = re.compile(
     re.IGNORECASE,
 )
 """Those, *in* where it may be inches as well as a word (*Bore in*), and names of angles."""
-_AXES: Final = frozenset("xyzuvwijkrdlpt")
-"""Letters in square brackets that say which size it is: *CIR1 [X]*."""
+_MARK_APART: Final = re.compile(r"[µμ]\s+m")
+_AXES: Final = frozenset("xyzuvwijkrdlpt" + "xyzvwijkrdlpt".upper() + "U") - {"u"}
+"""Letters in square brackets that say which size it is: *CIR1 [X]*. A small u is a µ where none can be typed."""
 _NO_UNITS: Final = (
     {*"xyzabcuvwijkrdln", "id", "max", "min", "avg", "mean", "med", "std", "ist", "soll", "act", "nom", "dia", "abs", "rel"}
     | {"dev", "ok", "nok", "raw", "ref", "bore", "boss", "hole", "slot", "pin", "web", "key", "rib", "top", "mid", "left", "back", "side"}
@@ -202,9 +204,9 @@ def unit_in(header: str) -> str | None:
     unknown = None
     for square, round_, angle in _BRACKETS.findall(header):
         word = (square or round_ or angle).strip()
-        if unit := length_unit(word):
+        if unit := length_unit(word) or length_unit(_MARK_APART.sub("µm", word)):
             return unit
-        if like_a_unit(word, least_doubt=bool(square)) and not (square and word.lower() in _AXES):
+        if like_a_unit(word, least_doubt=bool(square)) and not (square and word in _AXES):
             unknown = unknown or word
     if unknown is not None:
         raise UnknownUnit(unknown)

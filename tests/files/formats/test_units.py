@@ -30,7 +30,7 @@ def test_what_is_no_length_is_none(word: str) -> None:
     [
         ("Run-out [mil]", "mil"), ("Run-out (thou)", "thou"), ("D40 (in)", "inch"), ("Ø [mm]", "mm"), ("D [A] (µm)", "um"), ("Wert_um", "um"),
         ("Deviation (X)", None), ("Diameter (actual)", None), ("D40 (D12)", None), ("Value", None), ("minimum", None), ("Werte [1]", None),
-        ("Size {in}", "in"), ("Actual «in»", "in"), ("寸法（インチ）", "in"), ('Maß "', "in"), ("Maß ″", "in"), ("D40 'in'", "in"), ("D40 [in.]", "in"),
+        ("Dev [µ m]", "um"), ("CIR1 [U]", None), ("CIR1 [x]", None), ("Point [12]", None), ("Size {in}", "in"), ("Actual «in»", "in"), ("寸法（インチ）", "in"), ('Maß "', "in"), ("Maß ″", "in"), ("D40 'in'", "in"), ("D40 [in.]", "in"),
         ("D40:in", "in"), ("Diamètre (pouces)", "in"), ("Prečnik u inčima", "in"), ("Диаметр в дюймах", "in"), ("Prečnik (mikrona)", "um"),
         ("BoreUm", "um"), ("D40-um", "um"), ("D40 mikron", "um"), ("D40 micro meter", "um"), ("valueMils", "mil"), ("D40 milli inch", "mil"),
         ("Ra micro inch", "uin"), ('Ra µ"', "uin"), ("Ø 40 ±0,01 mm", "mm"), ("Flatness 0.01 mm", "mm"), ("M8x100", None), ("Bohrung E-3", None),
@@ -68,6 +68,12 @@ def test_the_unit_of_a_header(header: str, unit: str | None) -> None:
     ]
     + [
         "Maß [1/1000]",
+        "Dev [u]",
+        "Dev [x0.001]",
+        "Dev [1e-3]",
+        "Dev [e-3]",
+        "Dev [0,001]",
+        "Dev [1000]",
         "Dev [10^-3 mm]",
         "Dev [E-3 mm]",
         "0.0001in",
