@@ -69,10 +69,12 @@ def get_machine_performance(
 ) -> MachinePerformanceOut:
     """Pm and Pmk of the newest run of parts without a correction, a tool change or a setting in between (ISO 22514-3).
 
-    The run is looked for among the last 5000 readings; `side` and `confidence` are those of capability.
+    The run is looked for among the last 5000 readings, of those that are chosen; `side` and `confidence` are those of capability.
     """
     current = characteristics.characteristic_for(session, caller, characteristic, "viewer")
-    return machine_performance_out(newest_run(session, study_of(session, current, choice), readings))
+    study = study_of(session, current, choice)
+    chosen = choice.last or choice.period.bounded or choice.context
+    return machine_performance_out(newest_run(session, study, readings, study.window if chosen else None))
 
 
 @router.get(

@@ -1,6 +1,6 @@
 """Machine performance of the newest run of parts that nothing was changed in. Never writes. Lengths in mm."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from datetime import datetime
 
 import numpy as np
@@ -12,6 +12,7 @@ from app.core.spc.machine_performance import RUN, MachinePerformance
 from app.core.spc.quoting import or_refused
 from app.core.spc.refusal import Floats, Refused
 from app.loop.summaries import queries as statistics
+from app.loop.summaries.queries import Window
 from app.quality.capability.queries import Singles, Study, moment
 from app.quality.control_charts.series_queries import read
 
@@ -31,13 +32,16 @@ class Run:
     result: MachinePerformance | Refused
 
 
-def newest_run(session: Session, study: Study, length: int = RUN) -> Run | Refused:
+def newest_run(session: Session, study: Study, length: int = RUN, window: Window | None = None) -> Run | Refused:
     """The newest run of N parts between which no correction came into effect, no tool was changed and nothing was set.
 
-    Of the last 5000 readings, by the limits of the study; a `Refused` says how long the longest run among them is.
+    Of the last 5000 readings of the window, else of all, by the limits of the study; a `Refused` says how long the longest run
+    among them is.
     """
     current = study.current
-    window = statistics.window_of(session, current.characteristic, last=LOOKED_AT)
+    if window is None:
+        window = statistics.window_of(session, current.characteristic, last=LOOKED_AT)
+    window = replace(window, first=max(window.first, window.last - LOOKED_AT + 1))
     found = read(session, current, Singles(current.parameters.factor, "deviation"), window)
     series, at = found.series, found.measured_at
     effects = statistics.history_of(session, current.characteristic, window, ("compensated", "parameters_version"))

@@ -13,7 +13,7 @@ from app.quality.capability.machine_queries import LOOKED_AT, Run
 def no_run(refused: Refused) -> str:
     """The reason why there is no run, and how long the longest is."""
     return _(
-        "Among the last {looked_at} readings no {needed} parts follow each other without a correction, a tool change or a setting; the longest run has {have}. Cut {needed} parts with the corrections paused."
+        "Among the readings looked at, at most {looked_at}, no {needed} parts follow each other without a correction, a tool change or a setting; the longest run has {have}. Cut {needed} parts with the corrections paused."
     ).format(looked_at=LOOKED_AT, needed=refused.needed, have=refused.have)
 
 

@@ -230,6 +230,10 @@ def test_where_all_parts_lie_and_what_the_machine_alone_can_do(shop: Shop) -> No
     assert (run["readings"], run["first_sequence"], run["last_sequence"], run["left_out"]) == (50, 11, 61, 1)
     assert run["pm"]["value"] == pytest.approx(0.016 / (6 * run["sigma"]))
     assert run["pmk"]["low"] < run["pmk"]["value"] <= run["pm"]["value"]
+    asked = f"/characteristics/{key}/machine-performance?"
+    assert shop.call("GET", f"{asked}from=2001-01-01&to=2001-01-02")["readings"] == 0, "of another time there is none"
+    assert "the longest run has 39" in shop.call("GET", f"{asked}last=40")["refused"]
+    assert shop.call("GET", f"{asked}last=55")["first_sequence"] == run["first_sequence"]
     found = of(shop, characteristic=key)
     interval = found["tolerance_interval"]
     assert (interval["share"], interval["confidence"], interval["method"]) == (0.9973, 0.95, "normal")
