@@ -14,9 +14,10 @@ from app.files.formats.cell_values import DayOrder, Slashed, Unreadable, moment,
 from app.language.i18n import _
 
 DEFAULTS = frozenset(
-    date(*day) for day in ((1, 1, 1), (1899, 12, 30), (1899, 12, 31), (1900, 1, 1), (1904, 1, 1), (1970, 1, 1))
+    date(*day)
+    for day in ((1, 1, 1), (1899, 12, 30), (1899, 12, 31), (1900, 1, 1), (1904, 1, 1), (1970, 1, 1), (1980, 1, 1))
 )
-"""Days that programs write where they have none, some of them with a time of day."""
+"""Days that programs write where they have none, some of them with a time of day; clocks without a battery begin in 1980."""
 MIDNIGHTS = frozenset({date(2000, 1, 1)})
 """Days of which only the midnight is one: a clock that was never set begins there."""
 FAR = timedelta(days=366)

@@ -10,7 +10,7 @@ from app.language.i18n import _
 from app.loop.characteristics import queries as characteristics
 from app.loop.readings import queries
 from app.loop.readings.importing.cells import MOST_FLAWS, Flaw, Passed
-from app.loop.readings.importing.history import Flawed, Progress, Summary, store_history
+from app.loop.readings.importing.history import Flawed, Progress, Summary, nothing_in, store_history
 from app.loop.readings.importing.layout import Layout
 from app.loop.readings.importing.lines import Line, Read, lines
 from app.loop.readings.records import Entry
@@ -88,11 +88,13 @@ def _store_live(
 def _all_good(parsed_lines: Iterable[Line | Flaw | Passed], progress: Progress) -> tuple[list[ReadingIn], list[int]]:
     wanted: list[ReadingIn] = []
     numbers: list[int] = []
+    passed: dict[str, list[int]] = {}
     flaws: list[Flaw] = []
     wrong = 0
     for line in parsed_lines:
         progress()
         if isinstance(line, Passed):
+            passed.setdefault(line.reason, []).append(line.line)
             continue
         if isinstance(line, Flaw):
             wrong += 1
@@ -108,7 +110,7 @@ def _all_good(parsed_lines: Iterable[Line | Flaw | Passed], progress: Progress) 
     if wrong:
         raise Flawed(flaws, wrong)
     if not wanted:
-        raise Invalid(_("The file holds no readings: there is nothing after its header."), _("Nothing was imported."))
+        raise nothing_in(Summary(passed=passed).notes)
     return wanted, numbers
 
 

@@ -5,7 +5,7 @@ so that the machine goes on; the lock is taken only to number them and copy them
 was ever there.
 """
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field, replace
 from datetime import UTC, datetime
 from typing import Any
@@ -155,11 +155,18 @@ class Summary:
     last_at: datetime | None = None
     untimed: list[int] = field(default_factory=list)  # lines without a time, the first of them
     untimed_count: int = 0
+    before_times: list[int] = field(default_factory=list)  # the same, above the first line with a time
+    before_times_count: int = 0
     first_sequence: int | None = None
     last_sequence: int | None = None
     passed: dict[str, list[int]] = field(default_factory=dict)
     has_form: bool = False  # among the results of its touches
     without_form: list[str] = field(default_factory=list)  # characteristics of form that get no readings of it
+
+    def begin_times(self) -> None:
+        """The first line with a time: those above it take its time, which is known only now."""
+        self.before_times, self.before_times_count = self.untimed, self.untimed_count
+        self.untimed, self.untimed_count, self.first_at, self.last_at = [], 0, None, None
 
     @property
     def notes(self) -> list[str]:
@@ -168,6 +175,9 @@ class Summary:
             _("{lines}: {reason}; passed over.").format(lines=lines_of(each), reason=why)
             for why, each in self.passed.items()
         ]
+        if self.before_times_count:
+            named = lines_of(self.before_times, self.before_times_count)
+            texts.append(_("{lines}: no time; it is that of the first line below that has one.").format(lines=named))
         if 0 < self.untimed_count < self.lines:
             named = lines_of(self.untimed, self.untimed_count)
             texts.append(_("{lines}: no time; it is that of the line above.").format(lines=named))
@@ -288,7 +298,7 @@ def _driver(session: Session) -> Connection[Any]:
 def _stage(cursor: Cursor[Any], lines: Iterable[Line | Flaw | Passed], judge: _Judge, progress: Progress) -> Summary:
     summary = Summary()
     flaws: list[Flaw] = []
-    wrong = 0
+    wrong, dated = 0, None  # the first line with a time
     with cursor.copy(COPY) as copy:
         for line in lines:
             progress()
@@ -304,6 +314,9 @@ def _stage(cursor: Cursor[Any], lines: Iterable[Line | Flaw | Passed], judge: _J
             if wrong:
                 continue
             copy.write_row(row)
+            if dated is None and judge.time_above is not None:
+                dated = row
+                summary.begin_times()
             _count(summary, row)
             summary.has_form = summary.has_form or row[11] is not None
             if isinstance(line, Line) and line.reading.measured_at is None:
@@ -311,9 +324,20 @@ def _stage(cursor: Cursor[Any], lines: Iterable[Line | Flaw | Passed], judge: _J
                 summary.untimed += [line.number] if len(summary.untimed) < NAMED_LINES else []
         if wrong:
             raise Flawed(flaws, wrong)
+    if dated is not None and summary.before_times_count:
+        cursor.execute("UPDATE staged SET measured_at = %s WHERE line < %s", (dated[6], dated[0]))
     if not summary.lines:
-        raise Invalid(_("The file holds no readings: there is nothing after its header."), _("Nothing was imported."))
+        raise nothing_in(summary.notes)
     return summary
+
+
+def nothing_in(notes: Sequence[str]) -> Invalid:
+    """The refusal of a file without a reading. notes: on the lines that were passed over."""
+    if notes:
+        return Invalid(
+            _("The file holds no readings: {notes}").format(notes=" ".join(notes)), _("Nothing was imported.")
+        )
+    return Invalid(_("The file holds no readings: there is nothing after its header."), _("Nothing was imported."))
 
 
 def _count(summary: Summary, row: tuple[Any, ...]) -> None:

@@ -10,6 +10,7 @@ import pytest
 
 from app.bridge.file_content import read_content
 from app.db.engine import Database
+from app.errors import Invalid
 from app.files.aqdef.description import Source
 from app.files.aqdef.values import OF_FIELD as F
 from app.loop.readings.aqdef.sorting import Kept, Wanted, sort_out
@@ -184,3 +185,20 @@ def test_a_line_without_a_time_has_that_of_the_line_above_and_is_named(plant: Da
     stored = rows(plant.dsn, "SELECT extract(minute FROM measured_at), late FROM reading ORDER BY sequence")
     assert [(int(minute), late) for minute, late in stored] == [(5, False), (5, False), (5, False), (7, False)]
     assert run(plant, path, wishes=wishes).stored == 0, "the same file again"
+
+
+def test_lines_above_the_first_time_have_that_of_it(plant: Database, tmp_path: Path) -> None:  # noqa: F811
+    """Not that of today, by which a history would begin with its newest reading."""
+    path = table(tmp_path / "a.csv", ["", "01.01.1980 00:12:00", "18.11.2025 06:05:00", "18.11.2025 06:07:00"])
+    summary = run(plant, path, wishes=Wishes(timezone=ZONE, mapping={"measured": "actual"}))
+    assert summary.notes == ["lines 2, 3: no time; it is that of the first line below that has one."]
+    assert summary.first_at == datetime(2025, 11, 18, 5, 5, tzinfo=UTC)
+    stored = rows(plant.dsn, "SELECT extract(minute FROM measured_at), late FROM reading ORDER BY sequence")
+    assert [(int(minute), late) for minute, late in stored] == [(5, False), (5, False), (5, False), (7, False)]
+
+
+def test_a_table_of_missing_values_is_refused_for_them(plant: Database, tmp_path: Path) -> None:  # noqa: F811
+    path = tmp_path / "a.csv"
+    path.write_text("time;actual\n18.11.2025 06:05:00;---\n")
+    with pytest.raises(Invalid, match=r"holds no readings: line 2: .*missing"):
+        run(plant, path, wishes=Wishes(timezone=ZONE, mapping={"measured": "actual"}, missing=frozenset(["---"])))
