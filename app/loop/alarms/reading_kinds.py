@@ -49,11 +49,11 @@ def _tool_worn(alarm: Alarm) -> str:
             "Deviation {deviation} counts as {decided}, which has reached the wear limit {limit}: corrections that are not confirmed are "
             "counted in. Either one of them is in the offset already, or the tool is worn or broken."
         )
-        return _deviation(alarm, text)
+        return f"{_deviation(alarm, text)}{_cannot_be_stopped(alarm)}"
     text = _("Deviation {deviation} has reached the wear limit {limit}: tool {tool} is worn or broken.")
     if alarm.tool_memory is None:
         text = _("Deviation {deviation} has reached the wear limit {limit}: the tool is worn or broken.")
-    return _deviation(alarm, text)
+    return f"{_deviation(alarm, text)}{_cannot_be_stopped(alarm)}"
 
 
 def _not_accepted(alarm: Alarm) -> str:

@@ -210,6 +210,8 @@ def test_a_machine_that_cannot_be_stopped_is_named_in_the_alarm(shop: Shop) -> N
     beat(shop, carries_decisions=False)
     assert said in text()
     assert connection(shop)["carries_decisions"] is False
+    shop.read(400, shop.another("worn"))
+    assert [said in each["text"] for each in shop.alarms() if each["kind"] == "tool_worn"] == [True]
     beat(shop, carries_decisions=True)
     assert said not in text()
 
