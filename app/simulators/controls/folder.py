@@ -57,7 +57,7 @@ class FolderSimulator:
                 "zone": "UTC",
                 "columns": {"characteristic": "Feature", "measured": "Actual", "measured_at": "Time", "part": "Part"},
             },
-            "characteristics": {f"D{feature.number}": "shaft-1" for feature in self.model.features},
+            "characteristics": {f"D{feature.number}": f"shaft-{feature.number}" for feature in self.model.features},
         }
 
     async def _write(self) -> None:
