@@ -217,7 +217,7 @@ def targets(session: Session, machine: Machine, location: int) -> list[float]:
 def running_average(session: Session, machine: Machine, place: Place, value: float) -> float:
     """A of the last gauge calibration, as long as the empirical value by which it was judged is in effect; else 0.
 
-    One beyond R34 that nobody has accepted is passed over: it may have been another gauge.
+    One beyond R34 that is not accepted is passed over: it may have been another gauge.
     """
     last = session.scalars(
         select(CalibrationRecord)
