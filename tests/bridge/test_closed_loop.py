@@ -104,7 +104,9 @@ def test_one_program_run_takes_the_corrections_of_every_tool(shop: Shop, tmp_pat
         )
 
         async def all_sent() -> bool:
-            return not (await store.counts(shop.machine)).waiting and not await store.intents(shop.machine, "answered")
+            taken = model.registers[Register.ACK] == model.registers[Register.WRITTEN]
+            waiting = (await store.counts(shop.machine)).waiting
+            return taken and not waiting and not await store.intents(shop.machine, "answered")
 
         async with bridge(shop, one):
             await parts(model, 1)

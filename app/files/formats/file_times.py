@@ -84,7 +84,7 @@ def times_of(texts: Iterable[str], pattern: str | None = None, read: Read | None
     >>> times_of(["11/7/2025 6:05", "", "11/18/2025 6:06"]).order
     'month_first'
     >>> [day.year for day in sorted(times_of(["7.5.1999", "1.1.1970 00:00:00"]).absent)]
-    [1, 1899, 1899, 1900, 1904, 1970]
+    [1, 1899, 1899, 1900, 1904, 1970, 1980]
     >>> times_of(["1.1.1970 01:00:00", "", "1.1.1970 01:00:00"]).nothing
     True
     """
