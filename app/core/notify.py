@@ -1,7 +1,7 @@
 """Notifications of active alarms, to whom and when: routes, quiet hours, repetition, escalation, one message in place of a flood.
 
-A route names the alarms it is for and steps of receivers. A step begins some minutes after the alarm, or at once where
-nobody of the steps before it can be reached. A receiver gets at most one message in `GAP`, with everything that is due then.
+A route names the alarms it is for and steps of receivers. A step begins some minutes after the alarm, or with the step before
+where nobody of that can be reached now: failing, away, or in quiet hours. A receiver gets at most one message in `GAP`, with everything that is due then.
 """
 
 from collections import defaultdict
@@ -165,7 +165,7 @@ def notices(
         if not route.is_open(local, days_off):
             continue
         for alarm in filter(route.concerns, alarms):
-            for number, begun in _begun(route, receivers, alarm, now).items():
+            for number, begun in _begun(route, receivers, alarm, now, local).items():
                 receiver = receivers[number]
                 at = _due_at(route, receiver, alarm, begun, record)
                 if at is not None and at <= now and receiver.listens(now, local, urgent=route.urgent):
@@ -178,20 +178,23 @@ def notices(
     ]
 
 
-def _begun(route: Route, receivers: Mapping[int, Receiver], alarm: Raised, now: datetime) -> dict[int, datetime]:
-    """The receivers of the steps that have begun, and since when; a step after such as cannot be reached begins at once."""
+def _begun(
+    route: Route, receivers: Mapping[int, Receiver], alarm: Raised, now: datetime, local: datetime
+) -> dict[int, datetime]:
+    """The receivers of the steps that have begun, and since when; a step after such as cannot be reached begins with theirs."""
     begun: dict[int, datetime] = {}
     unreached = False
+    since = alarm.at
     for step in route.steps:
-        since = alarm.at + step.after
-        if since > now:
-            if not unreached:
+        if not unreached:
+            since = alarm.at + step.after
+            if since > now:
                 break
-            since = now
         known = [number for number in step.receivers if number in receivers]
         for number in known:
             begun.setdefault(number, since)
-        unreached = all(receivers[number].failing for number in known)
+        reachable = (receivers[number].listens(now, local, urgent=route.urgent) for number in known)
+        unreached = all(receivers[number].failing or not there for number, there in zip(known, reachable, strict=True))
     return begun
 
 

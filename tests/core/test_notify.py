@@ -2,6 +2,7 @@
 
 from datetime import UTC, date, datetime, time, timedelta
 from itertools import pairwise
+from zoneinfo import ZoneInfo
 
 import pytest
 from hypothesis import given
@@ -77,6 +78,16 @@ class TestHours:
             notices([route(on_days_off=False)], {1: Receiver(1)}, [alarm()], Record(), NOON, UTC, {NOON.date()}) == []
         )
 
+    @pytest.mark.parametrize(("month", "day"), [(3, 29), (10, 25)])  # the night before begins on the 28th, the 24th
+    def test_quiet_hours_end_by_the_clock_when_it_changes(self, month: int, day: int) -> None:
+        plant, night = ZoneInfo("Europe/Belgrade"), Hours(EVERY_DAY, time(22), time(6))
+        begin = datetime(2026, month, day - 1, 21, 30, tzinfo=plant).astimezone(UTC)
+        looks = [begin + n * 30 * MINUTE for n in range(24)]
+        quiet = [at for at in looks if night.hold(at.astimezone(plant))]
+        assert quiet[0].astimezone(plant).time() == time(22)
+        assert quiet[-1].astimezone(plant).time() == time(5, 30)
+        assert len(quiet) == {3: 14, 10: 18}[month], "seven hours in spring, nine in autumn"
+
     def test_quiet_hours_put_off_what_is_not_urgent(self) -> None:
         quiet = (Hours(EVERY_DAY, time(11), time(13)),)
         assert due([route()], NOON, quiet=quiet) == []
@@ -103,6 +114,17 @@ class TestWhom:
 
     def test_the_next_step_follows_at_once_where_nobody_can_be_reached(self) -> None:
         assert to(due([route((0, 1), (10, 2), (20, 3))], NOON, failing=True, busy=True)) == [2]
+
+    def test_away_or_in_quiet_hours_nobody_is_reached_either(self) -> None:
+        steps, quiet = route((0, 1), (10, 2)), (Hours(EVERY_DAY, time(22), time(13)),)
+        assert to(due([steps], NOON, away_until=NOON + HOUR)) == [2]
+        assert to(due([steps], NOON, quiet=quiet)) == [2]
+        assert to(due([route((0, 1), (10, 2), urgent=True)], NOON, quiet=quiet)) == [1], "it goes through quiet hours"
+
+    def test_a_digest_of_a_step_that_stands_in_ends_with_its_minutes(self) -> None:
+        steps = route((0, 1), (30, 2), digest=5 * MINUTE)
+        assert due([steps], NOON + 4 * MINUTE, failing=True, busy=True) == []
+        assert to(due([steps], NOON + 5 * MINUTE, failing=True, busy=True)) == [2]
 
     def test_a_receiver_that_is_gone_is_passed_over(self) -> None:
         assert to(due([route((0, 9), (10, 2))], NOON)) == [2]
