@@ -12,6 +12,8 @@ from app.settings import Settings
 Address = IPv4Address | IPv6Address
 MAIL = re.compile(r"[A-Za-z0-9.!#$%&'*+/=?^_`{|}~-]{1,64}@[A-Za-z0-9]([A-Za-z0-9.-]{0,250}[A-Za-z0-9])?")
 NAT64 = IPv6Network("64:ff9b::/96")
+INSIDE = [IPv6Network(each) for each in ("::/16", "64:ff9b:1::/48", "fec0::/10")]
+"""Addresses that lead into the own network, though `is_global` holds for some of them."""
 APPRISE = "pip install inband[notify]"
 
 
@@ -100,7 +102,7 @@ def is_public(address: Address) -> bool:
     [True, False, False, False, False]
     """
     real = _real(address)
-    return real.is_global and not real.is_multicast
+    return real.is_global and not real.is_multicast and not any(real in network for network in INSIDE)
 
 
 def _real(address: Address) -> Address:

@@ -35,10 +35,18 @@ Result = TypeVar("Result")
 
 
 class Answer(NamedTuple):
-    """The end of a delivery: whether it arrived, and what was answered, or why it was not reached."""
+    """The end of a delivery: whether it arrived, and what was answered, or why it was not reached.
+
+    perhaps: nothing was answered to a message that was under way, so it may have arrived.
+    """
 
     delivered: bool
     text: str
+    perhaps: bool = False
+
+
+class Unanswered(OSError):
+    """A mail was being handed over, and the mail server has not said what became of it."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -72,20 +80,23 @@ async def deliver(job: Job, settings: Settings) -> Answer:
         async with asyncio.timeout(LIMIT):
             if job.means == "webhook":
                 return await _to_webhook(job, settings)
-            send = _by_mail if job.means == "mail" else _by_apprise
-            return Answer(delivered=True, text=await _in_thread(_MAILS, lambda: send(job, settings)))
+            send, slots = (_by_mail, _MAILS) if job.means == "mail" else (_by_apprise, _APPRISE)
+            return Answer(delivered=True, text=await _in_thread(slots, lambda: send(job, settings)))
     except TimeoutError:
-        return Answer(delivered=False, text=_("no answer within {n} s").format(n=f"{LIMIT:g}"))
-    except Refused as error:
-        return Answer(delivered=False, text=_short(str(error)))
+        return Answer(delivered=False, text=_("no answer within {n} s").format(n=f"{LIMIT:g}"), perhaps=True)
+    except (Refused, Unanswered) as error:
+        return Answer(delivered=False, text=_short(str(error)), perhaps=isinstance(error, Unanswered))
+    except (smtplib.SMTPResponseException, smtplib.SMTPRecipientsRefused) as error:
+        return Answer(delivered=False, text=_short(_said(error)))
+    except httpx.ReadTimeout:
+        return Answer(delivered=False, text=_("no answer within {n} s").format(n=f"{STEP:g}"), perhaps=True)
     except (OSError, smtplib.SMTPException, httpx.HTTPError, httpx.InvalidURL, ValueError) as error:
-        return Answer(
-            delivered=False, text=_short(f"{type(error).__name__}: {error}" if str(error) else type(error).__name__)
-        )
+        text = _short(f"{type(error).__name__}: {error}" if str(error) else type(error).__name__)
+        return Answer(delivered=False, text=text)
 
 
-_MAILS, _NAMES = threading.BoundedSemaphore(32), threading.BoundedSemaphore(32)
-"""Threads that wait for mail servers or apprise, and for the name service: of one process, none of those that serve requests."""
+_MAILS, _APPRISE, _NAMES = (threading.BoundedSemaphore(32) for _each in range(3))
+"""Threads that wait for the mail server, apprise and the name service: of one process, none of those that serve requests."""
 
 
 async def _in_thread(slots: threading.BoundedSemaphore, work: Callable[[], Result]) -> Result:
@@ -132,13 +143,38 @@ def _by_mail(job: Job, settings: Settings) -> str:
         server: smtplib.SMTP = smtplib.SMTP_SSL(host, int(port or 465), timeout=STEP, context=_tls())
     else:
         server = smtplib.SMTP(host, int(port or (587 if settings.mail_security == "starttls" else 25)), timeout=STEP)
-    with server:
+    try:
         if settings.mail_security == "starttls":
             server.starttls(context=_tls())
         if settings.mail_user:
             server.login(settings.mail_user, settings.mail_password or "")
-        refused = server.send_message(mail)
-    return _short(str(refused)) if refused else _("The mail server has taken it.")
+        try:
+            _wait(server, LIMIT)  # some look through a mail for long before they take it
+            server.send_message(mail)
+        except (smtplib.SMTPServerDisconnected, TimeoutError):
+            raise Unanswered(
+                _("The mail server has not said whether it took it. The next try waits a minute.")
+            ) from None
+        with suppress(OSError):  # it has the mail, however it takes the farewell
+            _wait(server, 1)
+            server.quit()
+    finally:
+        server.close()
+    return _("The mail server has taken it.")
+
+
+def _wait(server: smtplib.SMTP, seconds: float) -> None:
+    if server.sock is not None:
+        server.sock.settimeout(seconds)
+
+
+def _said(error: smtplib.SMTPResponseException | smtplib.SMTPRecipientsRefused) -> str:
+    """The status and the words with which a mail server refused a mail."""
+    if isinstance(error, smtplib.SMTPRecipientsRefused):
+        ((code, words),) = error.recipients.values()
+    else:
+        code, words = error.smtp_code, error.smtp_error
+    return f"{code} {words.decode(errors='replace') if isinstance(words, bytes) else words}"
 
 
 @cache
@@ -159,6 +195,7 @@ async def _to_webhook(job: Job, settings: Settings) -> Answer:
     body, timestamp = msgspec.json.encode(job.message.data), str(int(time.time()))
     headers = {
         "Content-Type": "application/json",
+        "Accept-Encoding": "identity",
         "User-Agent": f"Inband/{__version__}",
         "X-Inband-Delivery": str(job.delivery),
         "X-Inband-Timestamp": timestamp,

@@ -18,12 +18,13 @@ MOST_IN_WORDS = 20
 
 
 def of_alarms(rows: Sequence[AlarmRow], count: int, again: Collection[int], address: str) -> Message:
-    """A message about active alarms. rows: the first `MOST_IN_WORDS` of `count`; again: those it reminds of."""
+    """A message about active alarms. rows: the most urgent `MOST_IN_WORDS` of `count`; again: those it reminds of."""
     reminder = len(again) >= count
     if count == 1:
         subject = f"{wording.kind_word(rows[0].alarm.kind)}: {_where(rows[0])}"
     else:
         subject = ngettext("{n} alarm", "{n} alarms", count).format(n=count)
+        subject = f"{subject}: {_which(rows, count)}"
     if reminder:
         subject = _("Reminder: {subject}").format(subject=subject)
     parts = [_in_words(row, address) for row in rows]
@@ -38,6 +39,15 @@ def of_alarms(rows: Sequence[AlarmRow], count: int, again: Collection[int], addr
         "alarms": [_as_json(row, address) for row in rows],
     }
     return Message(subject, "\n\n".join(parts) + "\n", data)
+
+
+def _which(rows: Sequence[AlarmRow], count: int) -> str:
+    """The first kinds of alarms, and the machine if it is one, for a subject."""
+    words = list(dict.fromkeys(wording.kind_word(row.alarm.kind) for row in rows))
+    more = " …" if len(words) > 2 or count > len(rows) else ""
+    machines = {row.machine.name for row in rows}
+    where = f" – {machines.pop()}" if len(machines) == 1 and count == len(rows) else ""
+    return f"{', '.join(words[:2])}{more}{where}"
 
 
 def _where(row: AlarmRow) -> str:

@@ -5,7 +5,7 @@ in it is sent again.
 """
 
 from collections import defaultdict
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
 from datetime import date, datetime, timedelta
 from typing import Any
 
@@ -29,6 +29,7 @@ from app.loop.notifications.tables import Announced, Delivery, NotificationRoute
 from app.loop.tables.alarms import Alarm
 from app.loop.tables.characteristics import Characteristic
 from app.loop.tables.machines import Machine
+from app.web.states import URGENCY
 
 BUSY = timedelta(minutes=1)
 KEPT = timedelta(days=31)
@@ -168,22 +169,35 @@ def _about_alarms(
     active = _active(session) if stored or planned else []
     if not active:
         return []
+    same = _same_address(rows)
     receivers = {
         number: notify.Receiver(
             number,
             week(map(HoursIn.model_validate, row.quiet)),
             row.away_until,
-            row.last_at,
+            max((rows[each].last_at for each in same[number] if rows[each].last_at), default=None),
             failing=row.failures > 0,
-            busy=number not in free,
+            busy=not same[number] <= free,
         )
         for number, row in rows.items()
     }
     routes = [Rule.model_validate(rule).value() for rule in stored]
     if planned:
         routes += _of_plans(session)
-    found = notices(routes, receivers, active, _record(session, active, now), now, plant_zone(), days_off)
-    return [_alarm_job(session, rows[notice.receiver], notice, address) for notice in found[:MOST_AT_ONCE]]
+    found = notices(routes, receivers, active, _record(session, active, same, now), now, plant_zone(), days_off)
+    found = list({min(same[notice.receiver]): notice for notice in reversed(found)}.values())  # one to each address
+    found.sort(key=lambda notice: rows[notice.receiver].failures)  # many that fail keep nobody waiting who can be reached
+    places = {each.id: (URGENCY.index(each.tone), each.id) for each in active}
+    first = [notice._replace(alarms=tuple(sorted(notice.alarms, key=places.__getitem__))) for notice in found]
+    return [_alarm_job(session, rows[notice.receiver], notice, address) for notice in first[:MOST_AT_ONCE]]
+
+
+def _same_address(rows: Mapping[int, Receiver]) -> dict[int, set[int]]:
+    """For each receiver all that lead to the same person or place."""
+    led = defaultdict[tuple[str, str], set[int]](set)
+    for number, row in rows.items():
+        led[row.means, row.address.casefold() if row.means == "mail" else row.address].add(number)
+    return {number: numbers for numbers in led.values() for number in numbers}
 
 
 def _of_plans(session: Session) -> list[Route]:
@@ -235,8 +249,8 @@ def _active(session: Session) -> list[Raised]:
     ]
 
 
-def _record(session: Session, active: Iterable[Raised], now: datetime) -> Record:
-    """Announcements of the active alarms, and of the same causes lately."""
+def _record(session: Session, active: Iterable[Raised], same: Mapping[int, set[int]], now: datetime) -> Record:
+    """Announcements of the active alarms, and of the same causes lately, to each receiver or to the same address."""
     causes = {each.cause for each in active}
     rows = session.execute(
         select(
@@ -257,11 +271,12 @@ def _record(session: Session, active: Iterable[Raised], now: datetime) -> Record
         .where(or_(Announced.at > now - CHATTER, Alarm.acknowledged_at.is_(None)))
         .order_by(Announced.at)
     ).all()
-    known = {(number, receiver): at for number, receiver, at, *_cause in rows}
+    known = {(number, each): at for number, receiver, at, *_cause in rows for each in same.get(receiver, ())}
     of_causes = {
-        (cause, receiver): at
+        (cause, each): at
         for _number, receiver, at, *names in rows
         if (cause := (names[0], names[1], names[2], names[3])) in causes
+        for each in same.get(receiver, ())
     }
     return Record(known, of_causes)
 
@@ -311,6 +326,8 @@ def end(session: Session, job: Job, answer: Answer) -> None:
     else:
         row.failures += 1
         row.retry_at = now + pause_after(row.failures)
+        if answer.perhaps and job.alarms:
+            row.last_at = now  # it may have arrived: the next message waits its minute
     publish(session, {"kind": "delivery", "id": job.delivery})
 
 

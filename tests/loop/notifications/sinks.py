@@ -1,5 +1,6 @@
 """The other ends of notifications: a mail server that keeps its mails, and a web server that misbehaves as it is asked to."""
 
+import asyncio
 import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -24,7 +25,7 @@ from app.loop.notifications.means import signature
 
 
 class Mails:
-    """A mail server. It takes everything."""
+    """A mail server. It takes everything, but for addresses that begin with what it does: refused, mute, rude."""
 
     def __init__(self, context: SSLContext | None = None) -> None:
         self.mails: list[Message] = []
@@ -32,10 +33,24 @@ class Mails:
         more: dict[str, Any] = {"tls_context": context, "require_starttls": True} if context else {}
         self.controller = Controller(self, hostname="127.0.0.1", port=0, ready_timeout=60, **more)
 
+    async def handle_RCPT(self, server: SMTP, session: Any, envelope: Any, address: str, options: Any) -> str:  # noqa: N802
+        """Refuse a recipient, or take it."""
+        if address.startswith("refused"):
+            return "550 Nema korisnika „Đoka“"
+        envelope.rcpt_tos.append(address)
+        session.rude = address.startswith("rude")
+        return "250 OK"
+
+    async def handle_QUIT(self, server: SMTP, session: Any, envelope: Any) -> str:  # noqa: N802
+        """Answer the farewell, or grumble at it."""
+        return "421 Closing" if getattr(session, "rude", False) else "221 Bye"
+
     async def handle_DATA(self, server: SMTP, session: Any, envelope: Any) -> str:  # noqa: N802 - aiosmtpd's name
         """Keep a mail."""
         self.encrypted.append(session.ssl is not None)
         self.mails.append(message_from_bytes(envelope.content, policy=default))
+        if envelope.rcpt_tos[0].startswith("mute"):
+            await asyncio.sleep(3600)  # until the server ends
         return "250 OK"
 
     def to(self, address: str) -> list[str]:

@@ -142,7 +142,7 @@ class TestMail:
         route(shop, (0, cleo))
         flood(shop, 300)
         (mail,) = until(lambda: mails[0].to(address))
-        assert mail.startswith("300 alarms\n")
+        assert mail.startswith("300 alarms: Hunting …\n")
         assert mail.count("https://inband.test/alarms/") == 20
         assert "… and 280 more: https://inband.test/alarms" in mail
         until(lambda: deliveries(shop, cleo, "delivered"))
@@ -301,8 +301,9 @@ def test_an_alarm_that_cannot_be_worded_keeps_no_other_waiting(routed: Database)
     with routed.begin() as session:
         raise_alarm(session, "hunting")  # without the numbers that its sentence names
         raise_alarm(session)
+        raise_alarm(session, "tool_worn")
     (job,) = planned(routed)
-    assert job.message.subject == "2 alarms"
+    assert job.message.subject == "3 alarms: Tool worn, Hunting … – M", "the most urgent first"
 
 
 def test_one_process_plans_at_a_time_and_what_it_has_begun_is_its_own(routed: Database) -> None:
@@ -329,6 +330,55 @@ def test_what_a_server_has_left_behind_is_sent_again(routed: Database) -> None:
         assert states == ["lost", "sending"]
         sending.end(session, again, Answer(delivered=True, text="250"))
     assert planned(routed) == []
+
+
+def test_a_mail_that_may_have_arrived_is_tried_again_after_its_minute(routed: Database) -> None:
+    with routed.begin() as session:
+        raise_alarm(session)
+    (job,) = planned(routed)
+    with routed.begin() as session:
+        sending.end(session, job, Answer(delivered=False, text="?", perhaps=True))
+        session.execute(text("UPDATE receiver SET retry_at = now()"))
+    assert planned(routed) == []
+    with routed.begin() as session:
+        session.execute(text("UPDATE receiver SET last_at = last_at - interval '1 minute'"))
+    assert len(planned(routed)) == 1
+
+
+def test_receivers_that_fail_keep_nobody_waiting(routed: Database, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(sending, "MOST_AT_ONCE", 1)
+    with routed.begin() as session:
+        raise_alarm(session)
+        session.execute(text("UPDATE receiver SET failures = 1"))
+        other = Receiver(name="Ben", means="mail", address="ben@example.com", created_by="tests")
+        session.add(other)
+        session.flush()
+        rule = RouteIn(name="Ben", steps=[{"receivers": [other.id]}])  # type: ignore[list-item]
+        stored = rule.model_dump(mode="json", exclude={"name", "enabled"})
+        session.add(NotificationRoute(name="Ben", rule=stored, created_by="tests"))
+    assert [job.address for job in planned(routed)] == ["ben@example.com"]
+
+
+def test_two_receivers_with_one_address_are_one_person(routed: Database) -> None:
+    with routed.begin() as session:
+        raise_alarm(session)
+        session.add(Receiver(name="A. B.", means="mail", address="Anna@Example.com", created_by="tests"))
+        session.flush()
+        numbers = session.scalars(text("SELECT id FROM receiver ORDER BY id")).all()
+        rule = RouteIn(name="Both", repeat=5, steps=[{"receivers": list(numbers)}])  # type: ignore[list-item]
+        stored = rule.model_dump(mode="json", exclude={"name", "enabled"})
+        session.add(NotificationRoute(name="Both", rule=stored, created_by="tests"))
+    (job,) = planned(routed)
+    with routed.begin() as session:
+        sending.end(session, job, Answer(delivered=True, text="250"))
+    assert planned(routed) == []
+    with routed.begin() as session:
+        session.execute(text("UPDATE receiver SET last_at = last_at - interval '2 minutes'"))
+    assert planned(routed) == [], "the alarm is announced"
+    with routed.begin() as session:
+        session.execute(text("UPDATE announced SET at = at - interval '5 minutes'"))
+    (reminder,) = planned(routed)
+    assert reminder.message.subject.startswith("Reminder: ")
 
 
 def test_somebody_whose_access_has_ended_gets_nothing(routed: Database) -> None:
@@ -379,7 +429,7 @@ PUBLIC = "93.184.215.14"
 @pytest.mark.parametrize(
     "inside",
     ["127.0.0.1", "10.1.2.3", "169.254.169.254", "::1", "::ffff:10.0.0.1", "64:ff9b::a00:1", "2002:a00:1::", "fd00::1",
-     "0.0.0.0", "224.0.0.1"],
+     "0.0.0.0", "224.0.0.1", "::10.0.0.1", "::ffff:0:10.0.0.1", "64:ff9b:1::a00:1", "fec0::1", "fe80::1%1"],
 )  # fmt: skip
 def test_addresses_inside_the_network_are_refused_unless_permitted(
     monkeypatch: pytest.MonkeyPatch, inside: str
@@ -419,9 +469,29 @@ def test_webhooks_do_not_lead_to_a_server_that_only_listens_inside(hooks: Hooks)
     assert hooks.at("/secret") == []
 
 
-def mail(server: str, **settings: Any) -> Answer:
-    job = Job(1, 1, "test", "mail", "anna@example.com", None, Message("Tool\r\nworn", "Text\n"))
+def mail(server: str, to: str = "anna@example.com", **settings: Any) -> Answer:
+    job = Job(1, 1, "test", "mail", to, None, Message("Tool\r\nworn", "Text\n"))
     return run(deliver(job, Settings(mail_server=server, **settings)))
+
+
+class TestWhatAMailServerSays:
+    def test_a_refusal_is_on_record_in_its_words(self, mails: tuple[Mails, str]) -> None:
+        answer = mail(mails[1], "refused@example.com", mail_security="none")
+        assert answer == Answer(delivered=False, text="550 Nema korisnika „Đoka“")
+
+    def test_a_mail_that_was_taken_is_taken_whatever_follows(self, mails: tuple[Mails, str]) -> None:
+        assert mail(mails[1], "rude@example.com", mail_security="none").delivered
+
+    def test_one_that_does_not_answer_may_have_taken_it(
+        self, mails: tuple[Mails, str], monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        monkeypatch.setattr(means, "LIMIT", 0.5)
+        answer = mail(mails[1], "mute@example.com", mail_security="none")
+        assert (answer.delivered, answer.perhaps) == (False, True)
+        assert [each["To"] for each in mails[0].mails].count("mute@example.com") == 1
+
+    def test_one_that_is_not_there_has_not(self) -> None:
+        assert not mail("localhost:9", mail_security="none").perhaps
 
 
 class TestEncryption:
