@@ -270,6 +270,8 @@ async def heartbeat(unit: Unit) -> dict[str, Any]:
                 "proved_at": _moment(here.proved_at) if here is not None and proved else None,
                 "offset": None if here is None else _sensible(here.offset),
                 "touch_test_by_page": machine.touch_tests_by_page and writes_offsets(unit.link),
+                "corrected": machine.corrections != "none",
+                "proof_needed": machine.proof_needed,
             }
         )
     return {

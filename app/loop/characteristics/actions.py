@@ -94,8 +94,7 @@ def add_characteristic(session: Session, given: CharacteristicIn, actor: str) ->
     after = given.model_dump(exclude={"parameters"}) | {"parameters": parameters.as_dict()}
     record(session, actor, "characteristic added", f"characteristic/{new.key}", None, after)
     publish(session, {"kind": "characteristic", "machine": machine.key, "characteristic": new.key})
-    mapped = queries.mapped(session, machine)
-    return CurrentCharacteristic(new, machine, version, mapped, None if source is None else source.key)
+    return queries.characteristic_named(session, new.key)
 
 
 def change_characteristic(
@@ -248,7 +247,7 @@ def _change_parameters(
     session: Session, current: CurrentCharacteristic, given: Mapping[str, Any], reason: str | None, actor: str
 ) -> tuple[CurrentCharacteristic, list[dict[str, Any]]]:
     """Under the machine's lock. Returns the state now, and what to tell everybody."""
-    characteristic, machine, version, _mapped, _source = current
+    characteristic, machine, version, *_more = current
     changed = merged(version.parameters, given)
     errors = refusals(changed, machine)
     old, new = current.parameters, None if errors else read(changed)[0]

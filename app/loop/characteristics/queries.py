@@ -23,7 +23,8 @@ from app.web.fields import is_slug
 class CurrentCharacteristic(NamedTuple):
     """A characteristic as it is now. mapped: what the machine's bridge may write to; None without a bridge.
 
-    source: the key of the characteristic whose form it is; None for all others.
+    source: the key of the characteristic whose form it is; None for all others. carries_decisions: whether the bridge brings `stop`
+    and `hold` to the control; None without one that says so.
     """
 
     characteristic: Characteristic
@@ -31,23 +32,16 @@ class CurrentCharacteristic(NamedTuple):
     version: ParametersVersion
     mapped: Sequence[Mapping[str, Any]] | None = None
     source: str | None = None
+    carries_decisions: bool | None = None
 
     @property
     def parameters(self) -> Parameters:
         return Parameters.from_dict(self.version.parameters)
 
-    @property
-    def is_unmapped(self) -> bool:
-        """Tell if the machine's bridge brings corrections to other tool memories, but not to this one's."""
-        parameters = self.parameters
-        if not self.mapped or parameters.measures_only:
-            return False
-        return all(location["tool_memory"] != parameters.tool_memory for location in self.mapped)
-
 
 _Source = aliased(Characteristic)
 _CURRENT = (
-    select(Characteristic, Machine, ParametersVersion, Connection.locations, _Source.key)
+    select(Characteristic, Machine, ParametersVersion, Connection.locations, _Source.key, Connection.carries_decisions)
     .join(Machine, Machine.id == Characteristic.machine_id)
     .outerjoin(_Source, (_Source.machine_id == Characteristic.machine_id) & (_Source.id == Characteristic.form_of))
     .outerjoin(Connection, Connection.machine_id == Machine.id)
@@ -106,11 +100,6 @@ def correcting(session: Session, machine_id: int, tool_memory: int) -> list[Curr
     on_it = _CURRENT.where(Stream.machine_id == machine_id, Stream.tool_memory == tool_memory)
     rows = session.execute(on_it.order_by(Characteristic.key))
     return [each for row in rows if not (each := CurrentCharacteristic(*row)).parameters.measures_only]
-
-
-def mapped(session: Session, machine: Machine) -> Sequence[Mapping[str, Any]] | None:
-    """Return the tool locations to which the bridge of a machine may write; None without a bridge."""
-    return session.scalar(select(Connection.locations).where(Connection.machine_id == machine.id))
 
 
 def key_is_taken(session: Session, key: str) -> bool:

@@ -21,7 +21,7 @@ from app.core.parameters import (
 )
 from app.core.plausibility import inch_warnings
 from app.core.variants import FormResult
-from app.loop.characteristics import queries, wording
+from app.loop.characteristics import bridged, queries, wording
 from app.loop.tables.characteristics import ParametersVersion
 from app.loop.warnings.wording import sentence
 from app.web.fields import Body, Reason, Slug, Text200
@@ -205,11 +205,13 @@ def warnings_of(
     if nanometres(parameters.zero_range) < nanometres(machine.zero_range_floor):
         values = {"value": parameters.zero_range, "floor": machine.zero_range_floor}
         unusual.append(Problem("zero_range", "signal_path", values, warning=True))
-    if current.is_unmapped:
-        place = {"value": parameters.tool_memory, "machine": machine.key}
-        unusual.append(Problem("tool_memory", "not_mapped", place, warning=True))
     inches = [] if before is None else inch_warnings([("parameters.target", parameters.target, before)])
-    return [*warnings_out(inches, sentence), *wording.warnings(unusual), *wording.superseded_warnings(superseded)]
+    return [
+        *warnings_out(inches, sentence),
+        *wording.warnings(unusual),
+        *bridged.warnings(current),
+        *wording.superseded_warnings(superseded),
+    ]
 
 
 def characteristic_out(
@@ -219,7 +221,7 @@ def characteristic_out(
     superseded: Sequence[int] = (),
 ) -> CharacteristicOut:
     """Return a characteristic as it is answered. before, given, superseded: as `warnings_of` has them."""
-    characteristic, machine, version, _mapped, source = current
+    characteristic, machine, version, source = current.characteristic, current.machine, current.version, current.source
     return CharacteristicOut(
         key=characteristic.key,
         name=characteristic.name,

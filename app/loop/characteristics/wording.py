@@ -233,17 +233,11 @@ def _of_values(problem: Problem, name: str) -> dict[str, str]:
             "The size is missing: say R42 nominal with R40 and R41 deviations, or R32 target with R35 tolerance width"
         ),
         "target_twice": _target_twice(problem, name),
-        "tolerance_sign": _(
-            "R40 upper deviation must be greater than R41 lower deviation; check the signs (h6 is 0 and −0.016)"
-        ),
+        "tolerance_sign": _limits_as_sizes(problem),
         "signal_path": _signal_path(problem, name),
         "no_location": _(
             "{name} {value} is not on this machine: it has {last}; the number is set with the machine"
         ).format(name=name, value=data.get("value"), last=data.get("last")),
-        "not_mapped": _(
-            "The bridge of this machine has no location for tool memory {value}: no correction of it reaches the control until "
-            "[[machine.{machine}.location]] names it. The other tools go on"
-        ).format(value=data.get("value"), machine=data.get("machine")),
     }
 
 
@@ -347,26 +341,33 @@ def _out_of_reach(problem: Problem, name: str) -> str:
     if problem.code != "out_of_reach":
         return ""
     return _(
-        "{name} {value} lies beyond ±a = {window} (R28), so touches never reach it: one outside ±a is a probe fault already. "
-        "Raise R28, or lower R36"
+        "{name} {value} does not lie inside ±a = {window} (R28), so touches do not reach it: one outside ±a is a probe fault "
+        "already. Raise R28, or lower R36"
     ).format(name=name, value=millimetres(problem.data["value"]), window=millimetres(problem.data["window"]))
 
 
 def _limits_as_sizes(problem: Problem) -> str:
-    if problem.code != "limits_as_sizes":
+    if problem.code not in {"limits_as_sizes", "tolerance_sign"}:
         return ""
     nominal, upper, lower = (problem.data[name] for name in ("nominal", "upper", "lower"))
+    values = {
+        "nominal": millimetres(nominal),
+        "upper": millimetres(upper),
+        "lower": millimetres(lower),
+        "target": millimetres(mean_nominal(nominal, upper, lower)[0]),
+    }
+    if problem.data["meant"] is not None:
+        up, low = map(millimetres, problem.data["meant"])
+        return _(
+            "R40 {upper} and R41 {lower} can hardly both be deviations from R42 {nominal}: the target would be {target}. Is one a limit "
+            "of size, or are both? As deviations they are {up} and {low}"
+        ).format(up=up, low=low, **values)
+    if problem.code == "tolerance_sign":
+        return _("R40 upper deviation must be greater than R41 lower deviation; check the signs (h6 is 0 and −0.016)")
     return _(
-        "R40 {upper} and R41 {lower} are large for deviations from R42 {nominal}: the target would be {target}. Are they limits "
-        "of size? As deviations those are {up} and {low}"
-    ).format(
-        upper=millimetres(upper),
-        lower=millimetres(lower),
-        nominal=millimetres(nominal),
-        target=millimetres(mean_nominal(nominal, upper, lower)[0]),
-        up=millimetres(round(upper - nominal, 9)),
-        low=millimetres(round(lower - nominal, 9)),
-    )
+        "R40 {upper} and R41 {lower} are large for deviations from R42 {nominal}: the target would be {target}. Check their decimal "
+        "point, sign and unit"
+    ).format(**values)
 
 
 def _averages_never(problem: Problem) -> str:

@@ -53,6 +53,10 @@ class LocationIn(BaseModel):
     touch_test_by_page: Annotated[
         bool, Field(strict=True, description="true: the bridge makes touch tests of it that are asked for here.")
     ] = False
+    corrected: Annotated[bool, Field(strict=True, description="false: the bridge carries no corrections to it.")] = True
+    proof_needed: Annotated[
+        bool, Field(strict=True, description="true: corrections wait until a touch test has proved this mapping.")
+    ] = True
 
 
 class QuarantinedIn(BaseModel):
@@ -167,6 +171,10 @@ class LocationOut(BaseModel):
     touch_test_by_page: Annotated[
         bool, Field(description="true: the bridge makes touch tests of it that are asked for here.")
     ] = False
+    corrected: Annotated[bool, Field(description="false: the bridge carries no corrections to it.")] = True
+    proof_needed: Annotated[
+        bool, Field(description="true: corrections wait until a touch test has proved this mapping.")
+    ] = True
 
 
 class QuarantinedOut(BaseModel):

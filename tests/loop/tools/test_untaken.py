@@ -9,7 +9,7 @@ from sqlalchemy.orm import Session
 from app.jobs.actions import run_jobs
 from app.loop.tools.untaken import Watch
 from tests.loop.connections.test_heartbeat import ago, beat
-from tests.shop import Shop
+from tests.shop import Person, Shop, unique
 
 STEP = 240.0  # s between two runs
 HELD: dict[str, Any] = {"tool_memory": 3, "number": 1, "reason": "Tool memory 3 has no location."}
@@ -100,29 +100,42 @@ def test_time_while_the_server_was_away_does_not_count(shop: Shop, runs: Runs) -
     assert len(runs(8)) == 1, "but from then on it does"
 
 
-def test_set_up_warns_of_a_tool_memory_without_a_location(shop: Shop) -> None:
-    def warned(memory: int, **more: Any) -> list[str]:
-        body: dict[str, Any] = {
-            "key": f"{shop.characteristic}-{memory}",
-            "name": "x",
-            "machine": shop.machine,
-            "unit": "mm",
-        }
-        parameters = shop.call("GET", f"/characteristics/{shop.characteristic}")["parameters"]
-        answer = shop.call(
-            "POST", "/characteristics", 201, **body, parameters=parameters | {"tool_memory": memory} | more
-        )
-        return [each["code"] for each in answer["warnings"]]
+def test_set_up_warns_of_what_the_bridge_does_not_carry(shop: Shop, engineer: Person) -> None:
+    parameters = shop.call("GET", f"/characteristics/{shop.characteristic}")["parameters"]
 
-    assert "not_mapped" not in warned(7), "no bridge"
+    def warned(memory: int, **more: Any) -> list[dict[str, Any]]:
+        body: dict[str, Any] = {"key": unique("warned"), "name": "x", "machine": shop.machine, "unit": "mm"}
+        given = parameters | {"tool_memory": memory} | more
+        return list(shop.call("POST", "/characteristics", 201, **body, parameters=given)["warnings"])
+
+    def codes(memory: int, **more: Any) -> list[str]:
+        return [each["code"] for each in warned(memory, **more)]
+
+    assert codes(7) == [], "no bridge"
+    beat(shop, locations=[])
+    [warning] = warned(7)
+    assert (warning["code"], "carries no corrections" in warning["text"]) == ("not_mapped", True)
+    assert codes(7, mode="measure_only") == []
+    place = {"tool_memory": 3, "proved_at": ago(days=1)}
+    beat(shop, locations=[place | {"corrected": False}])
+    assert codes(3) == ["not_mapped"], "the bridge may make touch tests of it, and carries nothing"
     beat(shop, locations=[{"tool_memory": 3}])
-    assert "not_mapped" in warned(8)
-    assert "not_mapped" not in warned(9, mode="measure_only")
+    [warning] = warned(3)
+    assert (warning["code"], f"plant.toml {shop.machine} 3" in warning["text"]) == ("not_proved", True)
+    assert codes(3, mode="measure_only") == []
+    beat(shop, locations=[{"tool_memory": 3, "proof_needed": False}])
+    assert codes(3) == []
+    beat(shop, locations=[place], carries_decisions=True)
+    assert (codes(3), codes(8), codes(9, mode="measure_only")) == ([], ["not_mapped"], [])
     change: dict[str, Any] = {"parameters": {"tool_memory": 8}, "reason": "another turret"}
-    answer = shop.call("PATCH", f"/characteristics/{shop.characteristic}", **change)
-    [warning] = [each for each in answer["warnings"] if each["code"] == "not_mapped"]
-    assert warning["field"] == "parameters.tool_memory"
+    [warning] = shop.call("PATCH", f"/characteristics/{shop.characteristic}", **change)["warnings"]
+    assert (warning["code"], warning["field"]) == ("not_mapped", "parameters.tool_memory")
     assert f"[[machine.{shop.machine}.location]]" in warning["text"]
+    beat(shop, locations=[place], carries_decisions=False)
+    assert codes(3, mode="measure_only") == ["no_stop"], "a probe fault stops that machine by an alarm alone"
+    page = engineer.open(f"/setup/characteristics/{shop.characteristic}")
+    assert "has no location for tool memory 8" in page
+    assert "cannot be stopped by Inband" in page
 
 
 def test_in_a_plant_where_nothing_waits_there_is_nothing_to_do(session: Session) -> None:
