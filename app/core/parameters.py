@@ -46,7 +46,7 @@ from app.core.parameter_table import (
     Variant,
     WearPolicy,
 )
-from app.core.unusual import unusual, unusual_calibration, unusual_on
+from app.core.unusual import as_deviations, unusual, unusual_calibration, unusual_on
 
 __all__ = [
     "AVERAGE_LOCATIONS",
@@ -376,13 +376,12 @@ def _target(values: dict[str, Any], problems: list[Problem]) -> None:
             values["nominal"], values["upper_deviation"], values["lower_deviation"], values["natural_limit"]
         )
         if width <= 0:
-            problems.append(
-                Problem(
-                    "upper_deviation",
-                    "tolerance_sign",
-                    {"upper": values["upper_deviation"], "lower": values["lower_deviation"]},
-                )
-            )
+            typed = {
+                "nominal": values["nominal"],
+                "upper": values["upper_deviation"],
+                "lower": values["lower_deviation"],
+            }
+            problems.append(Problem("upper_deviation", "tolerance_sign", typed | {"meant": as_deviations(**typed)}))
             return
         for name, computed in (("target", target), ("tolerance_width", width)):
             if name in values and nanometres(values[name]) != nanometres(computed):

@@ -12,7 +12,7 @@ CALIBRATION_RANGES = {"path_factor": (1, 10)}  # where L92 has another range tha
 
 SAME_PLACE = 0.05  # degrees between two places that are one
 COARSEST, COARSEST_SHARE = 1.0, 0.05  # mm, and share of the nominal: larger deviations are questioned
-NEAR = (0.5, 1.5)  # deviation / nominal, where it may be a limit of size
+NEAR, VERY_NEAR = (0.5, 1.5), (0.9, 1.1)  # deviation / nominal, where both may be limits of size, or one alone
 FACTORS = (0.1, 5.0)  # size of a factor: ½, 1, 2 and what slopes make of them; 25.4 and 1000 are units
 
 
@@ -32,10 +32,7 @@ def unusual(values: Mapping[str, Any]) -> Iterator[Problem]:
     yield from _averages_never(values)
     yield from _factor_of_tool(values)
     yield from _factor_of_a_unit(values)
-    window, confidence = values["path_factor"], values.get("confidence_limit")
-    if confidence is not None and nanometres(confidence) > nanometres(window):
-        data = {"value": confidence, "window": window}
-        yield Problem("confidence_limit", "out_of_reach", data, warning=True)
+    yield from _out_of_reach(values)
     if variant in (Variant.ROUND, Variant.ALONG) and max(points, values["accept_m"]) < 2:
         yield Problem("points", "points_missing", {"variant": str(variant)}, warning=True)
 
@@ -52,6 +49,33 @@ def _places(values: Mapping[str, Any]) -> Iterator[Problem]:
             yield Problem("index", "places_coincide", {"value": index, "point": turned + 1}, warning=True)
 
 
+def _out_of_reach(values: Mapping[str, Any]) -> Iterator[Problem]:
+    """Warn of an R36 that touches do not reach: beyond ±a, or at ±a itself where a mean of several would have to lie there."""
+    window, confidence = values["path_factor"], values.get("confidence_limit")
+    if confidence is None:
+        return
+    several = values["repeats"] > 1 or max(values["points"], values["accept_m"]) > 1
+    several = several or values["variant"] in (Variant.INDEXED, Variant.ROUND, Variant.ALONG)
+    if nanometres(confidence) >= nanometres(window) + (0 if several else 1):
+        data = {"value": confidence, "window": window}
+        yield Problem("confidence_limit", "out_of_reach", data, warning=True)
+
+
+def as_deviations(nominal: float, upper: float, lower: float) -> tuple[float, float] | None:
+    """Return the deviations that were meant where both of them, or one, are limits of size; None where they are not.
+
+    >>> as_deviations(40, 40.01, 39.99), as_deviations(40, 0.01, 39.99), as_deviations(40, 40.01, -0.01), as_deviations(40, 5, -5)
+    ((0.01, -0.01), (0.01, -0.01), (0.01, -0.01), None)
+    """
+    if nominal == 0:
+        return None
+    given = (upper, lower)
+    both = all(NEAR[0] <= deviation / nominal <= NEAR[1] for deviation in given)
+    sizes = [both or VERY_NEAR[0] <= deviation / nominal <= VERY_NEAR[1] for deviation in given]
+    up, low = (round(each - nominal, 9) if size else each for each, size in zip(given, sizes, strict=True))
+    return (up, low) if any(sizes) and up > low else None
+
+
 def _limits_as_sizes(values: Mapping[str, Any]) -> Iterator[Problem]:
     """Warn of deviations (R40, R41) as large as sizes: the source calls them limits, and drawings have limits, too."""
     nominal, upper, lower = (values.get(name) for name in ("nominal", "upper_deviation", "lower_deviation"))
@@ -60,7 +84,7 @@ def _limits_as_sizes(values: Mapping[str, Any]) -> Iterator[Problem]:
     largest = max(COARSEST_SHARE * abs(nominal), COARSEST)
     near = nominal != 0 and all(NEAR[0] <= deviation / nominal <= NEAR[1] for deviation in (upper, lower))
     if near or max(abs(upper), abs(lower)) > largest:
-        data = {"nominal": nominal, "upper": upper, "lower": lower}
+        data = {"nominal": nominal, "upper": upper, "lower": lower, "meant": as_deviations(nominal, upper, lower)}
         yield Problem("upper_deviation", "limits_as_sizes", data, warning=True)
 
 

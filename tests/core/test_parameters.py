@@ -6,6 +6,7 @@ from hypothesis import strategies as st
 
 from app.core.fits import fit_of
 from app.core.parameters import BY_NAME, BY_R, FIELDS, ParameterError, Parameters, Variant, read, unusual_switch
+from app.loop.characteristics.wording import sentence
 from tests.core.conftest import SHAFT
 
 
@@ -68,6 +69,55 @@ def test_limits_typed_as_sizes_are_questioned(drawing: tuple[float, float, float
 
 
 @pytest.mark.parametrize(
+    ("drawing", "meant"),
+    [
+        ((40, 40.010, 39.990), (0.01, -0.01)),
+        ((40, 0.010, 39.990), (0.01, -0.01)),  # one of the two alone; refused as they stand
+        ((40, 40.010, -0.010), (0.01, -0.01)),
+        ((40, 39.990, 40.010), None),  # sizes, and exchanged
+        ((-12.5, -0.1, -12.6), None),
+        ((-12.5, -12.4, -12.6), (0.1, -0.1)),
+        ((40, 0, -39.99), None),
+        ((40, 5, -5), None),  # a decimal point, or inches: no sizes at all
+        ((40, -0.01, 0.01), None),
+    ],
+)
+def test_what_was_meant_by_limits_is_said_where_it_is_known(
+    drawing: tuple[float, float, float], meant: tuple[float, float] | None
+) -> None:
+    names = ("nominal", "upper_deviation", "lower_deviation")
+    wide = {"averaging_limit": None, "zero_range": 0, "wear_limit": 1000, "confidence_limit": 1000}
+    given = SHAFT | wide | dict(zip(names, drawing, strict=True))
+    try:
+        found = read(given)[1]
+    except ParameterError as error:
+        found = error.problems
+    [problem] = [each for each in found if each.code in {"limits_as_sizes", "tolerance_sign"}]
+    assert problem.data["meant"] == meant
+    text = sentence(problem)
+    assert ("limit of size" in text) is (meant is not None), text
+    if meant:
+        assert text.endswith("As deviations they are 0.0100 mm and -0.0100 mm" if drawing[0] == 40 else "-0.1000 mm")
+
+
+@pytest.mark.parametrize(
+    ("changes", "asked"),
+    [
+        ({"R36": 1.0, "R28": 1}, False),  # one touch: at ±a it is reached
+        ({"R36": 1.0, "R28": 1, "R27": 2}, True),  # a mean: both would have to lie at ±a
+        ({"R36": 1.0, "R28": 1, "R25": 1}, True),
+        ({"R36": 1.0, "R25": 3, "R23": 3, "R26": -8, "accept": {"n": 2, "m": 3}}, True),  # the lathe line
+        ({"R36": 1.0, "R28": 2, "R25": 3, "R23": 3, "R26": -8}, False),
+        ({"R36": 0.999999, "R25": 1}, False),
+        ({"R36": 1.000001, "R28": 1}, True),
+    ],
+)
+def test_a_confidence_limit_that_touches_do_not_reach_is_warned_of(changes: dict[str, Any], asked: bool) -> None:
+    given = {name: value for name, value in SHAFT.items() if BY_NAME[name].r not in changes}
+    assert ("out_of_reach" in {warning.code for warning in read(given | changes)[1]}) is asked
+
+
+@pytest.mark.parametrize(
     ("changes", "warned"),
     [
         ({"R29": 4, "R33": 0.003, "average_memory": 0}, ["averages_never"]),
@@ -86,7 +136,7 @@ def test_limits_typed_as_sizes_are_questioned(drawing: tuple[float, float, float
     ],
 )
 def test_what_can_never_work_is_warned_of(changes: dict[str, Any], warned: list[str]) -> None:
-    given = {name: value for name, value in SHAFT.items() if BY_NAME[name].r not in changes}
+    given = {name: value for name, value in (SHAFT | {"path_factor": 2}).items() if BY_NAME[name].r not in changes}
     assert [warning.code for warning in read(given | changes)[1]] == warned
 
 

@@ -75,7 +75,7 @@ class TestSetUp:
         assert (made["direction"], made["axis"], made["variant"]) == ("negative", "Z", "two_point")
 
     def test_r24_beside_r25_in_a_change(self, common_shop: Shop) -> None:
-        common_shop.add("switched", R25=1)
+        common_shop.add("switched", R25=1, R28=2)
 
         def changed(**given: Any) -> tuple[str, list[str]]:
             body: dict[str, Any] = {"parameters": given, "reason": "the tables of the source print both"}
@@ -119,7 +119,7 @@ class TestSetUp:
     @pytest.mark.parametrize(
         ("given", "code", "field"),
         [
-            ({"R28": 7}, "source_range", "path_factor"),
+            ({"path_factor": 7}, "source_range", "path_factor"),
             ({"R25": 1, "R26": 400}, "source_range", "index"),
             ({"R25": 1, "R30": 2}, "variant_axis", "axis"),
             ({"R25": 3, "R23": 3, "R26": 8, "R30": 2}, "variant_axis", "axis"),
@@ -133,7 +133,7 @@ class TestSetUp:
             ({"R27": 11}, "source_range", "repeats"),
             ({"factor": -25.4}, "factor_of_a_unit", "factor"),
             ({"factor": -0.001}, "factor_of_a_unit", "factor"),
-            ({"confidence_limit": 1.000001}, "out_of_reach", "confidence_limit"),
+            ({"confidence_limit": 2.000001}, "out_of_reach", "confidence_limit"),
         ],
     )
     def test_what_the_cycles_would_not_take_is_warned_of(
@@ -143,7 +143,7 @@ class TestSetUp:
         key = f"unusual-{code}-{field}".replace("_", "-")
         made = common_shop.call(
             "POST", "/characteristics", 201, key=f"{key}-{len(str(given))}", name="x", machine=common_shop.machine,
-            parameters=PARAMETERS | given,
+            parameters=PARAMETERS | {"path_factor": 2} | given,
         )  # fmt: skip
         assert [(each["code"], each["field"]) for each in made["warnings"]] == [(code, f"parameters.{field}")]
         common_shop.call("PATCH", f"/machines/{common_shop.machine}", type="mill")
