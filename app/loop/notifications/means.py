@@ -170,11 +170,13 @@ def _wait(server: smtplib.SMTP, seconds: float) -> None:
 
 def _said(error: smtplib.SMTPResponseException | smtplib.SMTPRecipientsRefused) -> str:
     """The status and the words with which a mail server refused a mail."""
-    if isinstance(error, smtplib.SMTPRecipientsRefused):
-        ((code, words),) = error.recipients.values()
+    if isinstance(error, smtplib.SMTPResponseException):
+        said: list[tuple[int, bytes | str]] = [(error.smtp_code, error.smtp_error)]
     else:
-        code, words = error.smtp_code, error.smtp_error
-    return f"{code} {words.decode(errors='replace') if isinstance(words, bytes) else words}"
+        said = list(error.recipients.values())
+    return "; ".join(
+        f"{code} {words.decode(errors='replace') if isinstance(words, bytes) else words}" for code, words in said
+    )
 
 
 @cache

@@ -175,7 +175,7 @@ def _about_alarms(
             number,
             week(map(HoursIn.model_validate, row.quiet)),
             row.away_until,
-            max((rows[each].last_at for each in same[number] if rows[each].last_at), default=None),
+            max((at for each in same[number] if (at := rows[each].last_at) is not None), default=None),
             failing=row.failures > 0,
             busy=not same[number] <= free,
         )
@@ -186,7 +186,9 @@ def _about_alarms(
         routes += _of_plans(session)
     found = notices(routes, receivers, active, _record(session, active, same, now), now, plant_zone(), days_off)
     found = list({min(same[notice.receiver]): notice for notice in reversed(found)}.values())  # one to each address
-    found.sort(key=lambda notice: rows[notice.receiver].failures)  # many that fail keep nobody waiting who can be reached
+    found.sort(
+        key=lambda notice: rows[notice.receiver].failures
+    )  # many that fail keep nobody waiting who can be reached
     places = {each.id: (URGENCY.index(each.tone), each.id) for each in active}
     first = [notice._replace(alarms=tuple(sorted(notice.alarms, key=places.__getitem__))) for notice in found]
     return [_alarm_job(session, rows[notice.receiver], notice, address) for notice in first[:MOST_AT_ONCE]]
