@@ -37,7 +37,6 @@ LENGTHS = (15, 60, 250, 1_000, 4_000)  # characters
 SLOW = 0.01  # s of a processor, a hundred times what is usual for the longest: looked at more closely
 PROPORTION = 7.0  # times as long for four times the text; 16 is a square
 BOUNDED = {
-    "access.passwords._RUN": "an alternative of each row of keys; and a password is short",
     r"access.passwords ^(.{3,}?)\1+$": "a password is short",
     r"db.binaries (\d+)\.(\d+)": "what PostgreSQL's own programs say",
 }

@@ -114,7 +114,7 @@ def _parts(password: str, name: str) -> int:
                 for at in reversed([match.start() for match in re.finditer(re.escape(spelled), letters)]):
                     count += 1
                     rest = rest[:at] + "\0" + rest[at + len(spelled) :]
-    rest, runs = re.subn(_RUN, "\0", rest)
+    rest, runs = _runs().subn("\0", rest)
     rest, years = re.subn(r"(19|20)\d\d", "\0", rest)
     return count + runs + years + len(rest.replace("\0", ""))
 
@@ -131,7 +131,8 @@ def _known(name: str) -> list[str]:
     return sorted({*_COMMON.split(), *re.split(r"\W+", _plain(name))}, key=len, reverse=True)
 
 
-def _runs() -> str:
+@cache  # a server does without it until somebody chooses a password: it takes a seventh of a second
+def _runs() -> re.Pattern[str]:
     """An expression for three neighbours or more of a row, in either direction."""
     pieces = {
         row[at : at + length]
@@ -140,7 +141,4 @@ def _runs() -> str:
         for length in range(3, len(row) + 1)
         for at in range(len(row) - length + 1)
     }
-    return "|".join(sorted(map(re.escape, pieces), key=len, reverse=True))
-
-
-_RUN = re.compile(_runs())
+    return re.compile("|".join(sorted(map(re.escape, pieces), key=len, reverse=True)))

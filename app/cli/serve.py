@@ -267,15 +267,21 @@ def _serve(settings: "Settings", listening: socket.socket, finish: Callable[[], 
 
 def _create_alone(ending: _Ending) -> "ASGIApp":
     """The application of the only process."""
-    from app.main import create_app
+    from app.memory import reading_modules
+
+    with reading_modules():
+        from app.main import create_app
 
     return create_app(ending=ending.begin)
 
 
 def create_worker() -> "ASGIApp":
     """The application in one of several processes; it ends when the parent, which keeps the database, is killed."""
-    from app.main import create_app
-    from app.settings import Settings
+    from app.memory import reading_modules
+
+    with reading_modules():
+        from app.main import create_app
+        from app.settings import Settings
 
     settings = Settings()
     logs.configure(settings.log_level, settings.log_format)

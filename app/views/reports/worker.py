@@ -32,7 +32,11 @@ log = logging.getLogger(__name__)
 EVERY = 2.0  # s between two looks for something to do
 KEPT = 30.0  # s that the process waits for more
 END_WITHIN = 10.0  # s
-PROGRAM = "from app.views.reports.maker import main; main()"
+PROGRAM = """
+from app.memory import reading_modules
+with reading_modules():
+    from app.views.reports.maker import main
+main()"""
 LOCK = "'report_job'::regclass::oid::int4, %s"
 """Key of a job's advisory lock. Each plant has a table of its own, and so numbers of its own."""
 
