@@ -65,7 +65,7 @@ class Quoting(NamedTuple):
     why: str | None = None
 
 
-RULE = 2
+RULE = 3
 """Number of the rule by which an index may be quoted: one more with every change of it, so that kept indices are judged again."""
 FORBID_CPK = frozenset({Caution.NOT_IN_CONTROL, Caution.FEW_READINGS, Caution.COARSE})
 """Cautions beside which Cpk is not quoted: each says that the scatter from part to part is not known well enough."""

@@ -225,7 +225,7 @@ class CapabilityOut(BaseModel):
     excluded: list[int] = Field(description="Sequences that somebody took out of the statistics; at most 1000.")
     probe_faults: list[int] = Field(description="Probe faults, which are no measurement of a part; at most 1000.")
     far: list[int] = Field(
-        description="Readings more than ten sigma of the middle half from the median: counted, but to be looked at; at most 1000."
+        description="Readings far from all others (14 sigma of the bulk and more from the median): counted, but to be looked at; at most 1000."
     )
     lower_limit: float | None = Field(
         description="Limits of the deviation, of the newest reading's version; null for a natural one."
