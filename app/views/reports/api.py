@@ -20,7 +20,7 @@ from app.quality.capability.request import OfSigma
 from app.views.reports import queries
 from app.views.reports.request import EVERYTHING, ReportRequest, SectionName, section_names, zone_or_plants
 from app.web.api import CharacteristicKey, api_router, problems
-from app.web.choice import InPeriod
+from app.web.choice import InContext, InPeriod
 from app.web.deps import FROM_REPLICA, SessionDep
 from app.web.downloads import download
 
@@ -40,11 +40,12 @@ FILE: dict[int | str, dict[str, Any]] = {
 def request_from_query(
     request: Request,
     period: InPeriod,
+    context: InContext,
     last: Annotated[
         str | None,
         Query(
             pattern=r"^([1-9][0-9]{0,17}|all)$",
-            description="Only of the last N readings, or of `all`; without any period of the last 1000.",
+            description="Only of the last N readings, or of `all`; without period and context of the last 1000.",
         ),
     ] = None,
     section: Annotated[
@@ -66,7 +67,7 @@ def request_from_query(
     if timezone and zone.key == timezone:
         period = periods.period_of(request.query_params, zone)
     many = EVERYTHING if last == "all" else int(last) if last else None
-    return ReportRequest(period, many, section_names(section), paper, timezone or plant_zone().key, sigma_by)
+    return ReportRequest(period, many, section_names(section), paper, timezone or plant_zone().key, sigma_by, context)
 
 
 ReportQuery = Annotated[ReportRequest, Depends(request_from_query)]

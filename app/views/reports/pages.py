@@ -15,11 +15,12 @@ from app.files.documents.content import Format, Paper, Picture
 from app.language.i18n import _
 from app.loop.characteristics import queries as characteristics
 from app.loop.summaries import queries as summaries
+from app.loop.summaries import wording as statistics
 from app.quality.proof import queries as proof
 from app.quality.proof import wording as proof_wording
 from app.views.reports import queries
-from app.views.reports.request import EVERYTHING, LAST, ReportRequest, SectionName, typed
-from app.web.choice import in_address
+from app.views.reports.request import EVERYTHING, ReportRequest, SectionName, typed
+from app.web.choice import InContext, context_in_address, in_address
 from app.web.deps import FROM_REPLICA, SessionDep
 from app.web.forms import by_field
 from app.web.period import with_preset
@@ -44,6 +45,7 @@ def report_page(
     session: SessionDep,
     caller: Viewer,
     characteristic: str,
+    context: InContext,
     section: Annotated[list[str] | None, Query()] = None,
 ) -> Response:
     """The report as it is printed, and its files."""
@@ -55,7 +57,7 @@ def report_page(
         tool_since,
     )
     try:
-        report_request, problem = typed(typed_fields, section or HANDED_OVER), None
+        report_request, problem = typed(typed_fields, section or HANDED_OVER, context), None
     except Invalid as error:
         report_request, problem = ReportRequest(), error
     report = None if problem else queries.report_of(session, current, report_request, datetime.now(UTC), caller.name)
@@ -70,6 +72,7 @@ def report_page(
         report_request=report_request,
         given=typed_fields,
         tool_since=tool_since,
+        of_context=statistics.context_form(summaries.offered(session, current.characteristic), context),
         errors=_errors(problem),
         sections=[(name.value, queries.title_of(name), name in report_request.sections) for name in SectionName],
         papers=[(Paper.A4.value, "A4"), (Paper.LETTER.value, "Letter")],
@@ -101,8 +104,9 @@ def _errors(problem: InbandError | None) -> Mapping[str, str]:
 def _runs(key: str, typed_fields: Mapping[str, str], report_request: ReportRequest) -> list[tuple[str, str, bool]]:
     """Links to usual periods."""
     unchanged = {name: typed_fields[name] for name in ("timezone", "paper") if typed_fields[name]}
+    unchanged |= context_in_address(report_request.context)
     timed = report_request.period.bounded
-    now = "all" if report_request.last == EVERYTHING else str(report_request.last or LAST)
+    now = "all" if report_request.newest in (None, EVERYTHING) else str(report_request.newest)
     return [
         (
             _("All") if run == "all" else run,
@@ -117,6 +121,7 @@ def _query(report_request: ReportRequest) -> str:
     """The same request as the API takes them."""
     named: dict[str, Any] = {
         **in_address(report_request.period),
+        **context_in_address(report_request.context),
         "last": "all" if report_request.last == EVERYTHING else report_request.last,
         "paper": None if report_request.paper is Paper.A4 else report_request.paper.value,
         "timezone": report_request.zone,

@@ -6,6 +6,7 @@ from datetime import UTC, datetime, timedelta
 from enum import StrEnum
 from zoneinfo import ZoneInfo
 
+from app.core.context import Chosen
 from app.core.period import ALWAYS, Period
 from app.core.spc import USUAL_READINGS
 from app.errors import FieldError, Invalid
@@ -54,7 +55,10 @@ def _in_every_zone(moment: datetime) -> bool:
 
 @dataclass(frozen=True)
 class ReportRequest:
-    """Request for a report. `last`: only the last N readings; of them those measured in the period."""
+    """Request for a report. `last`: only the last N readings; of them those measured in the period.
+
+    context: only of readings with these values in their context; without `last` and period of all of them.
+    """
 
     period: Period = ALWAYS
     last: int | None = None
@@ -62,6 +66,7 @@ class ReportRequest:
     paper: Paper = Paper.A4
     zone: str = field(default_factory=lambda: plant_zone().key)
     sigma_by: SigmaBy = SigmaBy.NEIGHBOURS
+    context: Chosen = ()
 
     def __post_init__(self) -> None:
         """Raises `Invalid` for a period that runs backwards and for a time zone that there is not."""
@@ -85,7 +90,7 @@ class ReportRequest:
     @property
     def newest(self) -> int | None:
         """Number of the last readings in the report; `LAST` where nothing else was asked for."""
-        return LAST if self.last is None and not self.period.bounded else self.last
+        return LAST if self.last is None and not self.period.bounded and not self.context else self.last
 
 
 def zone_or_plants(name: str | None) -> ZoneInfo:
@@ -110,7 +115,7 @@ def section_names(names: Sequence[str]) -> tuple[SectionName, ...]:
     return tuple(name for name in SectionName if not names or name in names)
 
 
-def typed(fields: Mapping[str, str], sections: Sequence[str]) -> ReportRequest:
+def typed(fields: Mapping[str, str], sections: Sequence[str], context: Chosen = ()) -> ReportRequest:
     """As people type it: moments without an offset are those of the named time zone, else the plant's. Raises `Invalid`, naming every field."""
     errors: list[FieldError] = []
     zone: ZoneInfo | None = None
@@ -138,4 +143,5 @@ def typed(fields: Mapping[str, str], sections: Sequence[str]) -> ReportRequest:
         sections=section_names(sections),
         paper=Paper(paper),
         zone=zone.key if zone else plant_zone().key,
+        context=context,
     )

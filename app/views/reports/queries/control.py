@@ -68,7 +68,7 @@ def control(frame: Frame) -> Section | None:
     return Section(
         "control",
         title,
-        sentences=(_judged_by(baseline), *_left_out(views[0])),
+        sentences=(_judged_by(baseline), *_among(frame), *_left_out(views[0])),
         warnings=_warnings(frame, baseline),
         facts=(
             *_of_baseline(baseline),
@@ -84,6 +84,14 @@ def _judged_by(baseline: Baseline) -> str:
     return _("Judged by baseline {version}, frozen by {who}: {reason}").format(
         version=baseline.version, who=baseline.actor, reason=baseline.reason
     )
+
+
+def _among(frame: Frame) -> tuple[str, ...]:
+    if not frame.request.context:
+        return ()
+    first, last = frame.window.first, frame.window.last
+    text = _("Each reading is judged among its neighbours: signals are of all readings from {first} to {last}.")
+    return (text.format(first=first, last=last),)
 
 
 def _left_out(main: View) -> tuple[str, ...]:

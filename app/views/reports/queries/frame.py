@@ -56,6 +56,7 @@ class Frame:
             self.current.characteristic,
             last=request.newest,
             period=request.period,
+            context=request.context,
             usable=request.last is None,
         )
 

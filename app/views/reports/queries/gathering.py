@@ -14,6 +14,8 @@ from app.language.i18n import _
 from app.language.times import in_zone
 from app.loop.characteristics.queries import CurrentCharacteristic
 from app.loop.characteristics.wording import choice
+from app.loop.readings.wording import field_word
+from app.loop.summaries.wording import context_words
 from app.quality.proof import queries as proof
 from app.quality.proof import wording as proof_wording
 from app.views.reports.queries import capability, charts, control, loop, numbers, record, summary
@@ -100,13 +102,14 @@ def _section(frame: Frame, name: SectionName) -> Section | None:
 
 
 def _period(frame: Frame) -> str:
-    """The period in words, as it is on every page."""
+    """The period and the context in words, as they are on every page."""
     request, ends, zone = frame.request, frame.ends, ZoneInfo(frame.request.zone)
     period = " – ".join(moment(at).words(zone) if at is not None else "…" for at in request.period)
+    period = ", ".join(filter(None, (context_words(request.context), period if request.period.bounded else "")))
     if ends is None:
-        return _("no readings") if not request.period.bounded else _("{period}, no readings").format(period=period)
+        return _("{period}, no readings").format(period=period) if period else _("no readings")
     measured = " – ".join(moment(end.measured_at).words(zone) for end in ends)
-    span = period if request.period.bounded else measured
+    span = period if request.period.bounded else ", ".join(filter(None, (period, measured)))
     return _("{span}, readings {first} to {last}").format(span=span, first=ends[0].sequence, last=ends[1].sequence)
 
 
@@ -116,6 +119,7 @@ def _head(frame: Frame) -> list[Fact]:
         Fact("characteristic", _("Characteristic"), words(characteristic.key)),
         Fact("machine", _("Machine"), words(f"{machine.name} ({machine.key})")),
         Fact("part", _("Part"), words(characteristic.part or "–")),
+        *(Fact(f"context.{field.value}", field_word(field), words(value)) for field, value in frame.request.context),
     ]
     if parameters.nominal is not None:
         facts += [

@@ -120,6 +120,13 @@ def wear(frame: Frame) -> Section | None:
         facts.append(Fact("forecasts_held", _("Earlier forecasts"), words(text.held), note=text.about_interval))
     facts.append(Fact("corrected", _("Sum of the corrections of this tool"), deviation(study.total)))
     sentences = [text.wear, *([text.note] if text.note else [])]
+    if frame.request.context:
+        sentences.insert(
+            0,
+            _("The tool wears with every part: this is of all readings from {first} to {last}.").format(
+                first=frame.window.first, last=frame.window.last
+            ),
+        )
     if text.hunting:
         sentences.append(f"{text.hunting_word}: {text.hunting}")
     pictures: tuple[Picture, ...] = ()

@@ -1,7 +1,8 @@
 """Sections on the record of the period: alarms, notes, parameters, excluded readings, decisions."""
 
-from sqlalchemy import func, or_, select
+from sqlalchemy import func, or_, select, true
 
+from app.core.context import ContextField
 from app.core.parameters import BY_NAME
 from app.db.period import in_period
 from app.files.documents.content import Column, Fact, Section, Table, count, deviation, moment, size, table_of, words
@@ -148,7 +149,9 @@ def quarantined(frame: Frame) -> Section | None:
         QuarantinedPart.characteristic_id == frame.current.characteristic.id,
     )
     lists = select(QuarantinedPart.quarantine_id).where(*here, frame.holds(QuarantinedPart.sequence))
-    of_period = QuarantinedPart.sequence.is_(None) | frame.holds(QuarantinedPart.sequence)
+    order = dict(frame.request.context).get(ContextField.ORDER)
+    of_order = true() if order is None else func.coalesce(QuarantinedPart.order, order) == order
+    of_period = (QuarantinedPart.sequence.is_(None) & of_order) | frame.holds(QuarantinedPart.sequence)
     inside = (*here, QuarantinedPart.quarantine_id.in_(lists), of_period)
     total = frame.session.scalar(select(func.count()).select_from(QuarantinedPart).where(*inside)) or 0
     newest = (QuarantinedPart.quarantine_id.desc(), QuarantinedPart.number.desc())
