@@ -70,7 +70,7 @@ def get_tool(session: DoorSessionDep, caller: AnyCaller, machine: MachineKey, to
     machine_row = machine_for(session, caller, machine, "viewer")
     queries.tool(session, machine_row, tool)
     row = queries.tools(session, machine_row, only=tool)[0]
-    return tool_out(row, machine_row.key, gain_queries.gains(session, machine_row, tool))
+    return tool_out(row, machine_row.key, gain_queries.shown_gains(session, machine_row, tool))
 
 
 @router.put("/machines/{machine}/tools/{tool}", responses=problems(404, 412))

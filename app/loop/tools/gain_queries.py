@@ -13,6 +13,7 @@ from app.loop.tables.alarms import Alarm
 from app.loop.tables.characteristics import Characteristic, ParametersVersion
 from app.loop.tables.machines import Machine
 from app.loop.tables.readings import Exclusion, Reading, Stream
+from app.loop.tables.tools import OPPOSITE, Tool
 from app.loop.tools.alarm_kinds import UNUSUAL_GAIN
 
 NEWEST = 200  # readings that are looked at
@@ -50,6 +51,22 @@ def gains(session: Session, machine: Machine, number: int) -> list[ToolGain]:
         parameters = Parameters.from_dict(stored)
         found.append(ToolGain(stream.characteristic_id, key, parameters.factor, _gain(session, stream, parameters)))
     return found
+
+
+def shown_gains(session: Session, machine: Machine, number: int) -> list[ToolGain]:
+    """The same for people. While the tool is paused for what two corrections did, that is the gain known last."""
+    found = gains(session, machine, number)
+    pausing = session.scalars(
+        select(Alarm)
+        .join(Tool, (Tool.machine_id == Alarm.machine_id) & (Tool.paused_by == Alarm.id))
+        .where(Tool.machine_id == machine.id, Tool.number == number, Alarm.kind == OPPOSITE)
+    ).one_or_none()
+    if pausing is None:
+        return found
+    gain, half = pausing.data["gain"], 2 * pausing.data["error"]
+    known = Gain(gain, gain - half, gain + half, len(pausing.data["corrections"]), 0, GainVerdict.OPPOSITE)
+    of = pausing.data["characteristic"]
+    return [each._replace(gain=each.gain or known) if each.characteristic == of else each for each in found]
 
 
 def _gain(session: Session, stream: Stream, parameters: Parameters) -> Gain | None:

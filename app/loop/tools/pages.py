@@ -61,7 +61,7 @@ def memories(
         tools=tools,
         averages=queries.averages(session, machine_row),
         chosen=chosen,
-        gains=gain_queries.gains(session, machine_row, chosen.tool.number),
+        gains=gain_queries.shown_gains(session, machine_row, chosen.tool.number),
         steps=part_of(
             steps,
             STEPS_ON_PAGE,

@@ -60,6 +60,11 @@ def test_a_wrong_sign_is_stopped_by_the_second_correction(loop: Loop) -> None:
     assert "sign of the factor" in alarm["what_to_do"]
     assert "offset register" in alarm["what_to_do"]
     assert shop.tool(4)["paused_by"] == alarm["id"]
+    [known] = shop.tool(4)["gains"]
+    assert (known["gain"], known["verdict"], known["corrections"]) == (alarm["data"]["gain"], "opposite", 2)
+    assert known["gain"] < -0.9
+    page = Person(shop.server, "operator").open(f"/machines/{shop.machine}/tools?tool=4")
+    assert "from 2 corrections" in page
     assert f"paused by alarm {alarm['id']}" in answers[-1]["reason"]["text"]
     assert shop.call("GET", f"/machines/{shop.machine}/corrections?status=pending")["items"] == []
     assert loop.part()["reason"]["code"] == "paused"
