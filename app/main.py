@@ -28,6 +28,7 @@ from app.jobs.runner import JobRunner
 from app.language.times import use_zone
 from app.loop.calibration import jobs
 from app.loop.connections import jobs as connection_jobs
+from app.loop.connections import server_away
 from app.loop.control_plan import jobs as control_plan_jobs
 from app.loop.machines.keys import caller_of_key
 from app.loop.notifications.notifier import Notifier
@@ -153,7 +154,7 @@ JOBS: tuple[PeriodicJob, ...] = (
 def jobs_of(settings: Settings) -> tuple[PeriodicJob, ...]:
     """All of them, as the settings have it."""
     untaken = Watch(settings.corrections_taken_within, settings.corrections_not_taken_most)
-    return *JOBS, connection_jobs.job(settings.bridge_silent_after), untaken.job()
+    return server_away.JOB, *JOBS, connection_jobs.job(settings.bridge_silent_after), untaken.job()
 
 
 NOT_COMPRESSED = (

@@ -1,10 +1,10 @@
-"""Alarm kinds of bridges: one is silent, or readings back up in it. Both end by themselves."""
+"""Alarm kinds of connections: a bridge is silent or backs up, or the server was unreachable. They end by themselves."""
 
 from collections.abc import Callable, Mapping
 from datetime import datetime
 from typing import Any
 
-from app.language.i18n import _
+from app.language.i18n import _, ngettext
 from app.language.numbers import as_read
 from app.loop.alarms.kinds import AlarmKind, register
 from app.loop.tables.alarms import Alarm
@@ -33,6 +33,24 @@ def _backing_up(alarm: Alarm) -> str:
     )
 
 
+def _late(sentence: str, item: Mapping[str, Any]) -> str:
+    late = int(item.get("late") or 0)
+    if not late:
+        return sentence
+    return f"{sentence} " + ngettext(
+        "{n} reading came late, and its decision with it.",
+        "{n} readings came late, and their decisions with them.",
+        late,
+    ).format(n=late)
+
+
+def _server_away(alarm: Alarm) -> str:
+    return _(
+        "The server was unreachable from {begin} to {end}: in that time no correction and no stop reached this machine. What was "
+        "measured meanwhile is decided as it arrives."
+    ).format(begin=_since(alarm, "from"), end=_since(alarm, "until"))
+
+
 _REMOVED: dict[str, Callable[[Mapping[str, Any]], str]] = {
     "connection_removed": lambda _item: _("The connection was removed: the machine has no bridge any more.")
 }
@@ -47,7 +65,7 @@ BRIDGE_SILENT = register(
         ),
         icon="no_data",
         comments={"noted": lambda: [_("Bridge started again"), _("Network repaired"), _("Machine is switched off")]},
-        outcomes={"bridge_heard": lambda _item: _("The bridge has spoken again.")} | _REMOVED,
+        outcomes={"bridge_heard": lambda item: _late(_("The bridge has spoken again."), item)} | _REMOVED,
     )
 )
 BRIDGE_BACKING_UP = register(
@@ -62,6 +80,20 @@ BRIDGE_BACKING_UP = register(
         icon="waiting",
         comments={"noted": lambda: [_("Network repaired"), _("Disk made larger")]},
         outcomes={"backlog_gone": lambda _item: _("The backlog is gone.")} | _REMOVED,
+    )
+)
+SERVER_AWAY = register(
+    AlarmKind(
+        "server_away",
+        word=lambda: _("Server was unreachable"),
+        sentence=_server_away,
+        what_to_do=lambda: _(
+            "Look at the parts of that time, and at the server's log for why it was. The alarm ends when what was measured "
+            "meanwhile has arrived."
+        ),
+        icon="no_data",
+        comments={"noted": lambda: [_("Server updated"), _("Power failure"), _("Network repaired")]},
+        outcomes={"server_back": lambda item: _late(_("The server is reachable again."), item)},
     )
 )
 GONE = {BRIDGE_SILENT.name: "bridge_heard", BRIDGE_BACKING_UP.name: "backlog_gone"}

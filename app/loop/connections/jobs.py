@@ -3,7 +3,7 @@
 An alarm that somebody has acknowledged is not raised again for the same silence or the same backlog.
 """
 
-from datetime import timedelta
+from datetime import datetime, timedelta
 from functools import partial
 from typing import Any
 
@@ -18,6 +18,7 @@ from app.language.i18n import _
 from app.loop.alarms import actions as alarms
 from app.loop.alarms.kinds import kind_named
 from app.loop.connections.alarm_kinds import BRIDGE_BACKING_UP, BRIDGE_SILENT, GONE
+from app.loop.connections.queries import came_late
 from app.loop.machines.queries import lock_machines
 from app.loop.tables.alarms import Alarm
 from app.loop.tables.connections import Connection
@@ -57,15 +58,25 @@ def tell(silent_after: timedelta, session: Session, unit: Unit) -> None:
         )
         publish(session, alarms.news(machine.key, raised))
     else:
-        end(session, machine, name, ACTOR, _("It is over"), GONE[name])
+        end(session, machine, name, ACTOR, _("It is over"), GONE[name], **_late(session, machine, name))
 
 
-def end(session: Session, machine: Machine, name: str, by: str, comment: str, outcome: str) -> None:
-    """End one of these alarms; the machine is locked. Without one nothing happens."""
+def end(session: Session, machine: Machine, name: str, by: str, comment: str, outcome: str, **more: int) -> None:
+    """End one of these alarms; the machine is locked. Without one nothing happens. more: numbers that the outcome says."""
     active = alarms.active_of_place(session, machine.id, kind_named(name), PLACE)
-    ended = alarms.settle(session, active, by, comment, {"code": outcome})
+    ended = alarms.settle(session, active, by, comment, {"code": outcome, **more})
     if ended is not None:
         publish(session, alarms.news(machine.key, ended))
+
+
+def _late(session: Session, machine: Machine, name: str) -> dict[str, int]:
+    """The readings of a silence that is over: those that have come, and those that the bridge still keeps."""
+    active = alarms.active_of_place(session, machine.id, kind_named(name), PLACE)
+    connection = session.get(Connection, machine.id)
+    if name != BRIDGE_SILENT.name or active is None or connection is None:
+        return {}
+    since = datetime.fromisoformat(active.data["received_at"])
+    return {"late": came_late(session, machine.id, since, connection.received_at) + connection.waiting}
 
 
 def _values(connection: Connection) -> dict[str, Any]:

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from datetime import datetime, timedelta
 from typing import NamedTuple
 
-from sqlalchemy import Select, func, select, text
+from sqlalchemy import Interval, Select, func, literal, select, text
 from sqlalchemy.orm import Session
 
 from app.db.text import holds_words
@@ -12,6 +12,9 @@ from app.errors import NotFound
 from app.language.i18n import _
 from app.loop.tables.connections import Connection
 from app.loop.tables.machines import Machine
+from app.loop.tables.readings import Reading
+
+LATE = timedelta(minutes=1)
 
 # Functions beside a table: where Citus is, the node that holds the plant answers. Numbers are given by the sequence, which
 # is asked by itself: it lies where Inband is connected to. The journal alone would not do: it keeps some hours.
@@ -98,3 +101,15 @@ def connection_of(session: Session, machine: Machine) -> ConnectionRow:
             _("Start the bridge with this machine in its configuration, or look at another machine."),
         )
     return row
+
+
+def came_late(session: Session, machine_id: int, begin: datetime, end: datetime) -> int:
+    """Return how many readings of a machine were measured in this time and came more than a minute later. Imports do not count."""
+    late = select(func.count()).where(
+        Reading.machine_id == machine_id,
+        Reading.received_at >= begin,
+        Reading.measured_at.between(begin, end),
+        Reading.received_at > Reading.measured_at + literal(LATE, Interval),
+        Reading.code != "imported",
+    )
+    return session.scalars(late).one()

@@ -7,6 +7,7 @@ import psycopg
 from sqlalchemy import text
 
 from app.jobs.actions import run_jobs
+from app.loop.connections import server_away
 from app.loop.connections.jobs import due, job
 from tests.conftest import Server
 from tests.loop.connections.test_heartbeat import ago, beat
@@ -127,3 +128,72 @@ def test_removing_a_connection_ends_its_alarms(shop: Shop, server: Server) -> No
     assert shop.alarms() == []
     beat(shop)
     shop.call("GET", path)
+
+
+def gap(shop: Shop, minutes: int, busy: float = 0) -> None:
+    """Let the server have been unreachable for so long, as this machine sees it. busy: seconds that another job took."""
+    with shop.server.database.begin() as session:
+        session.execute(text("DELETE FROM job_run WHERE job = 'server_away'"))
+        ran = "INSERT INTO job_run VALUES (:job, now() - make_interval(mins => :ago), :seconds, 1)"
+        for job_name, ended, seconds in (("server_away", minutes, 0.0), ("long", 0, busy)):
+            session.execute(text(ran), {"job": job_name, "ago": ended, "seconds": seconds})
+        for unit in server_away.due(session):
+            if f"/{shop.machine}/" in unit.subject:
+                server_away.tell(session, unit)
+        session.execute(text("DELETE FROM job_run WHERE job IN ('server_away', 'long')"))
+
+
+def later(shop: Shop, minutes: int) -> dict[str, Any]:
+    """Let the alarm about it be older, run the job, and return the alarm."""
+    [number] = [alarm["id"] for alarm in shop.alarms() if alarm["kind"] == "server_away"]
+    with psycopg.connect(shop.server.database.dsn) as connection:
+        connection.execute("SET session_replication_role = replica")  # else it is refused: an alarm is a fact
+        connection.execute(
+            "UPDATE alarm SET data = data || jsonb_build_object('until', now() - make_interval(mins => %s)) WHERE id = %s",
+            [minutes, number],
+        )
+    run_jobs(shop.server.database, [server_away.JOB])
+    return dict(shop.call("GET", f"/alarms/{number}"))
+
+
+def test_a_server_that_was_away_for_an_hour_says_so_at_each_machine_that_was_at_work(server: Server) -> None:
+    bridged, direct, idle = Shop(server), Shop(server), Shop(server)
+    idle.read(0, measured_at=ago(hours=9))
+    for shop in (bridged, direct):
+        shop.read(0, measured_at=ago(minutes=70))
+    beat(bridged, waiting=3)
+    gap(bridged, 3)
+    assert bridged.alarms() == [], "shorter than it may take to start again"
+    for shop in (bridged, direct, idle):
+        gap(shop, 60)
+    assert (kinds(bridged), kinds(direct), kinds(idle)) == (["server_away"], ["server_away"], [])
+    [alarm] = bridged.alarms()
+    assert "no correction and no stop reached this machine" in alarm["text"]
+    for shop, late in ((bridged, 3), (direct, 1)):
+        shop.push([0.0] * late, measured_at=[ago(minutes=50 - n) for n in range(late)])
+    assert later(bridged, 5)["state"] == "active", "readings wait in the bridge"
+    beat(bridged, waiting=0)
+    ended = later(bridged, 5)
+    assert (ended["state"], ended["outcome"][0]["code"]) == ("acknowledged", "server_back")
+    assert "3 readings came late" in ended["outcome"][0]["text"]
+    assert later(direct, 5)["outcome"][0]["late"] == 1
+    run_jobs(server.database, [server_away.JOB])
+    assert (kinds(bridged), kinds(direct)) == ([], [])
+
+
+def test_jobs_that_took_long_are_no_server_that_was_away(shop: Shop) -> None:
+    shop.read(0)
+    gap(shop, 9, busy=500)
+    assert shop.alarms() == []
+
+
+def test_a_silence_that_is_over_says_how_many_readings_came_late(shop: Shop) -> None:
+    beat(shop)
+    silent_for(shop, 40)
+    run(shop)
+    [alarm] = shop.alarms()
+    shop.push([0.0] * 2, measured_at=[ago(minutes=30), ago(minutes=20)])
+    beat(shop, waiting=5, oldest_waiting_at=ago(minutes=1))
+    run(shop)
+    [outcome] = shop.call("GET", f"/alarms/{alarm['id']}")["outcome"]
+    assert outcome["text"] == "The bridge has spoken again. 7 readings came late, and their decisions with them."
