@@ -127,9 +127,9 @@ def cautions(past: ToolHistory) -> list[str]:
     cautions += left_out(past)
     if past.others:
         cautions.append(
-            _("The tool is corrected by {others} as well; they are replayed with it, set as they were.").format(
-                others=", ".join(past.others[:5])
-            )
+            _(
+                "The tool is corrected by {others} as well; they are replayed with it, set as they were. Their alarms are not counted here."
+            ).format(others=", ".join(past.others[:5]))
         )
     if len(past.versions) > 1:
         cautions.append(
