@@ -183,12 +183,6 @@ class Excluded(BaseModel):
     reason: str
 
 
-class ReadingRow(ReadingAnswer):
-    """A stored reading."""
-
-    excluded: Annotated[Excluded | None, Field(description="If it was taken out of the statistics.")]
-
-
 class ReadingContextOut(BaseModel):
     """The circumstances of a reading, as they were sent with it; null where nothing was said."""
 
@@ -249,6 +243,18 @@ class AtTwenty(BaseModel):
         return cls(**found._asdict(), missing=None, text=text)
 
 
+class ReadingRow(ReadingAnswer):
+    """A stored reading."""
+
+    excluded: Annotated[Excluded | None, Field(description="If it was taken out of the statistics.")]
+    at_20: Annotated[
+        AtTwenty | None,
+        Field(
+            description="Its size at 20 °C, beside the measured one; null: no temperature was sent with it, or it is a probe fault."
+        ),
+    ]
+
+
 class ReadingDetail(ReadingRow):
     """A stored reading with everything about it."""
 
@@ -267,9 +273,3 @@ class ReadingDetail(ReadingRow):
         ),
     ]
     context: Annotated[ReadingContextOut | None, Field(description="Its circumstances, if any were sent.")]
-    at_20: Annotated[
-        AtTwenty | None,
-        Field(
-            description="Its size at 20 °C, beside the measured one; null: no temperature was sent with it, or it is a probe fault."
-        ),
-    ]

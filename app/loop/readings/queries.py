@@ -4,6 +4,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from typing import Any, NamedTuple
 
 from sqlalchemy import ColumnElement, func, select, tuple_
+from sqlalchemy.dialects.postgresql import array
 from sqlalchemy.orm import Session
 
 from app.access.callers import Caller
@@ -325,21 +326,35 @@ def detail(session: Session, entry: Entry, sequence: int) -> dict[str, Any]:
         )
     )
     measurements = by_hand.of_readings(session, entry.machine_id, entry.characteristic_id, [sequence])
-    (found,) = answers(session, entry, [record])
+    (found,) = with_at_20(session, entry, answers(session, entry, [record]))
     return found | {
         "by_hand": [in_json(measurement) for measurement in measurements.get(sequence, ())],
         "touches": touches_of(session, entry, [sequence]).get(sequence),
         "machined_at": record.machined_at,
         "correction_in_effect": record.correction_in_effect,
         "context": context,
-        "at_20": None if record.zone == Zone.PROBE_FAULT else _at_20(session, entry, found["size"], context),
     }
 
 
-def _at_20(session: Session, entry: Entry, size: float, context: Mapping[str, Any] | None) -> AtTwenty | None:
-    if context is None:  # of nearly all
-        return None
-    return AtTwenty.of(at_20(size, context, expansion_of(session, entry.machine_id, entry.characteristic_id)))
+def with_at_20(session: Session, entry: Entry, found: Sequence[dict[str, Any]]) -> list[dict[str, Any]]:
+    """These answers with their sizes at 20 °C; None of a probe fault, and where no temperature was sent."""
+    here = (ReadingContext.machine_id == entry.machine_id, ReadingContext.characteristic_id == entry.characteristic_id)
+    measured = [answer["sequence"] for answer in found if answer["zone"] != Zone.PROBE_FAULT]
+    rows = session.execute(
+        select(ReadingContext.sequence, ReadingContext.context).where(
+            *here,
+            ReadingContext.sequence.in_(measured),
+            ReadingContext.context.has_any(array(["part_temperature", "machine_temperature"])),
+        )
+    )
+    contexts = {sequence: context for sequence, context in rows}  # noqa: C416 - rows are no pairs to mypy
+    if not contexts:  # of nearly all
+        return [answer | {"at_20": None} for answer in found]
+    expansion = expansion_of(session, entry.machine_id, entry.characteristic_id)
+    return [
+        answer | {"at_20": AtTwenty.of(at_20(answer["size"], contexts.get(answer["sequence"]), expansion))}
+        for answer in found
+    ]
 
 
 def hand_measurements(

@@ -88,7 +88,7 @@ def decisions(
     entry = readings.entry_named(session, current.characteristic.key)
     of_those = [in_context(context)] if context else []
     answers = readings.answers(session, entry, readings.latest(session, entry, before, limit, *of_those))
-    return _complete(session, current, entry, answers)
+    return _complete(session, current, entry, readings.with_at_20(session, entry, answers))
 
 
 def decision(session: Session, current: CurrentCharacteristic, sequence: int) -> Decision:

@@ -194,6 +194,7 @@ def answers(session: Session, records: Sequence[Record]) -> list[dict[str, Any]]
     answered: dict[tuple[int, int, int], dict[str, Any]] = {}
     for place, of_place in by_place.items():
         entry = readings.entry_by_id(session, *place)
-        for record, answer in zip(of_place, readings.answers(session, entry, of_place), strict=True):
+        found = readings.with_at_20(session, entry, readings.answers(session, entry, of_place))
+        for record, answer in zip(of_place, found, strict=True):
             answered[(*place, record.sequence)] = answer
     return [answered[record.machine_id, record.characteristic_id, record.sequence] for record in records]

@@ -67,6 +67,23 @@ def test_a_reading_has_its_size_at_20_degrees_beside_the_measured_one(shop: Shop
     assert at_20(shop)["correction"] == pytest.approx(-40 * 11.5e-6 * 2, abs=1e-6)
 
 
+def test_lists_and_reports_have_it_too(shop: Shop) -> None:
+    expands(shop, **STEEL)
+    shop.read(0.0, part="warm", context={"part_temperature": 24.0})
+    shop.read(0.0, part="unknown")
+    shop.read(1500, part="warm", context={"part_temperature": 24.0})  # a probe fault
+    rows = shop.call("GET", f"/readings?characteristic={shop.characteristic}")["items"]
+    assert rows[0]["at_20"] == at_20(shop)
+    assert rows[0]["at_20"]["size"] == pytest.approx(39.99816, abs=1e-6)
+    assert [row["at_20"] for row in rows[1:]] == [None, None]
+    (decisions,) = shop.call("GET", f"/characteristics/{shop.characteristic}/report.json?section=decisions")["sections"]
+    column = [each["key"] for each in decisions["table"]["columns"]].index("size_at_20")
+    assert [row[column]["value"] for row in decisions["table"]["rows"]] == [None, None, rows[0]["at_20"]["size"]]
+    viewer = Person(shop.server, "viewer")
+    for page in (f"/characteristics/{shop.characteristic}", "/parts/warm"):
+        assert viewer.open(page).count("20 °C: 39.9982") == 1
+
+
 @pytest.mark.parametrize("broken", [-300, 900, 3276.7])
 def test_a_temperature_that_cannot_be_true_costs_no_reading(shop: Shop, broken: float) -> None:
     expands(shop, **STEEL)

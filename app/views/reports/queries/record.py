@@ -1,5 +1,8 @@
 """Sections on the record of the period: alarms, notes, parameters, excluded readings, decisions."""
 
+from collections.abc import Mapping
+from typing import Any
+
 from sqlalchemy import func, or_, select, true
 
 from app.core.context import ContextField
@@ -274,13 +277,15 @@ def decisions(frame: Frame) -> Section | None:
         frame.session, entry, frame.window.last + 1, MOST_DECISIONS,
         Reading.sequence >= frame.window.first, frame.window.meant,
     )  # fmt: skip
-    answers = readings.answers(frame.session, entry, records)
+    answers = readings.with_at_20(frame.session, entry, readings.answers(frame.session, entry, records))
+    at_20 = (Column("size_at_20", _("Size at 20 °C"), 1.2, "right"), lambda answer: size(_at_20(answer)))
     table = table_of(
         answers,
         (Column("reading", _("Reading"), 0.8, "right"), lambda answer: count(answer["sequence"])),
         (Column("measured_at", _("Measured at"), 1.2), lambda answer: moment(answer["measured_at"])),
         (Column("part", _("Part"), 1.3), lambda answer: words(answer["part"])),
         (Column("size", _("Size"), 1.2, "right"), lambda answer: size(answer["size"])),
+        *([at_20] if any(_at_20(answer) is not None for answer in answers) else []),
         (Column("measured", _("Machine reading"), 1.2, "right"), lambda answer: size(answer["measured"])),
         (Column("deviation", _("Deviation"), 0.8, "right"), lambda answer: deviation(answer["deviation"])),
         (Column("zone", _("Zone"), 0.8), lambda answer: words(zone_name(answer["zone"]))),
@@ -297,3 +302,7 @@ def decisions(frame: Frame) -> Section | None:
     )
     sentence = _("Newest first; the export of readings holds all of them.")
     return Section("decisions", _("Decisions"), sentences=(sentence,), table=table)
+
+
+def _at_20(answer: Mapping[str, Any]) -> float | None:
+    return answer["at_20"].size if answer["at_20"] else None
