@@ -30,6 +30,7 @@ from app.loop.calibration import jobs
 from app.loop.connections import jobs as connection_jobs
 from app.loop.connections import server_away
 from app.loop.control_plan import jobs as control_plan_jobs
+from app.loop.faults.actions import report_touch_count
 from app.loop.machines.keys import caller_of_key
 from app.loop.notifications.notifier import Notifier
 from app.loop.present_context import actions as present_context
@@ -253,7 +254,8 @@ def create_plant(settings: Settings, prefix: str = "") -> Application:
     database, doors, background = _pools(settings, connections, waits)
     replica = replica_of(settings, database, waited=waits.labels("replica").observe)
     keys, directory = KeyRing(doors, caller_of_key), Directory(doors)
-    writer, live, jobs = Writer(database), Live(connections, still_granted), JobRunner(background, jobs_of(settings))
+    writer = Writer(database, partial(report_touch_count, doors))
+    live, jobs = Live(connections, still_granted), JobRunner(background, jobs_of(settings))
     report_worker, notifier = ReportWorker(background, settings), Notifier(background, settings, shift_words)
 
     @asynccontextmanager

@@ -135,6 +135,9 @@ async def _push(unit: Unit, client: AsyncClient, row: Waiting) -> Decision | Non
         if not_from_inband(error):
             raise
         reason = str(error)
+        if error.document.get("action") in STOPPING and not row.again:
+            stop = Decided(row.key, str(row.body.get("characteristic")), error.document["action"], error.kind)
+            await _for_control(unit, [stop])
     except Forbidden:
         if not await _key_is_right(unit, client):
             raise
@@ -154,13 +157,18 @@ async def _push(unit: Unit, client: AsyncClient, row: Waiting) -> Decision | Non
 
 async def _decided(unit: Unit, pairs: Sequence[tuple[Waiting, Decision]]) -> None:
     """Note for the control what the server has decided; a stop outlives the bridge. What is sent again was decided before."""
-    if not carries_decisions(unit.link):
-        return
     decided = [
         Decided(row.key, decision.characteristic, decision.action, decision.reason.code, decision.measure_next)
         for row, decision in pairs
         if not row.again
     ]
+    await _for_control(unit, decided)
+
+
+async def _for_control(unit: Unit, decided: list[Decided]) -> None:
+    """Keep decisions for a control that takes any."""
+    if not carries_decisions(unit.link):
+        return
     if stopping := [each for each in decided if each.action in STOPPING]:
         await unit.store.keep_decisions(unit.machine.key, stopping)
     unit.decisions += decided

@@ -475,6 +475,25 @@ def test_a_reading_that_is_refused_holds_up_no_other(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("together", [1, 2])
+def test_a_refusal_that_asks_for_a_stop_reaches_the_control(tmp_path: Path, together: int) -> None:
+    """More touches than the characteristic has: nothing is stored, and the machine must not cut on."""
+    server = Scripted()
+    document = said("invalid")["document"] | {"action": "stop"}
+    server.refuses = lambda reading: (
+        Invalid("POST /readings", "too many", status=422, document=document) if reading["measured"] > 90 else None
+    )
+
+    async def before(store: Store) -> None:
+        body = {"measured": 99.0, "characteristic": "shaft-1"}
+        await store.add(M, [Received(f"k{n}", body, Position(7, n)) for n in range(1, together + 1)])
+
+    unit = story(tmp_path, server, before)
+    stops = [Decided(f"k{n}", "shaft-1", "stop", "invalid") for n in range(1, together + 1)]
+    assert (unit.decisions, run(unit.store.decisions(M))) == (stops, stops)
+    assert [each.key for each in run(unit.store.quarantine(M))] == [each.key for each in reversed(stops)]
+
+
+@pytest.mark.parametrize("together", [1, 2])
 def test_what_a_proxy_answers_puts_no_reading_into_the_quarantine(tmp_path: Path, together: int) -> None:
     """While the server is started anew, some answer "404 page not found" in its place."""
     server = Scripted()

@@ -49,11 +49,11 @@ def _tool_worn(alarm: Alarm) -> str:
             "Deviation {deviation} counts as {decided}, which has reached the wear limit {limit}: corrections that are not confirmed are "
             "counted in. Either one of them is in the offset already, or the tool is worn or broken."
         )
-        return f"{_deviation(alarm, text)}{_cannot_be_stopped(alarm)}"
+        return f"{_deviation(alarm, text)}{cannot_be_stopped(alarm)}"
     text = _("Deviation {deviation} has reached the wear limit {limit}: tool {tool} is worn or broken.")
     if alarm.tool_memory is None:
         text = _("Deviation {deviation} has reached the wear limit {limit}: the tool is worn or broken.")
-    return f"{_deviation(alarm, text)}{_cannot_be_stopped(alarm)}"
+    return f"{_deviation(alarm, text)}{cannot_be_stopped(alarm)}"
 
 
 def _not_accepted(alarm: Alarm) -> str:
@@ -107,23 +107,23 @@ TOOL_WORN = register(
 def _probe_fault(alarm: Alarm) -> str:
     paused = " " + _("Compensation is paused.")
     if alarm.data.get("first_move_triggered"):
-        return first_move_sentence(alarm.data.get("feature")) + paused + _cannot_be_stopped(alarm)
+        return first_move_sentence(alarm.data.get("feature")) + paused + cannot_be_stopped(alarm)
     if "touch" in alarm.data:
-        return touch_problem(TouchError(**alarm.data["touch"])) + paused + _cannot_be_stopped(alarm)
+        return touch_problem(TouchError(**alarm.data["touch"])) + paused + cannot_be_stopped(alarm)
     if alarm.data.get("beyond_natural_limit"):
         text = _(
             "Deviation {deviation} lies beyond the natural limit, where no part can be: the probe, the zero or the sign is wrong. "
             "Compensation is paused."
         )
-        return f"{_deviation(alarm, text)}{_cannot_be_stopped(alarm)}"
+        return f"{_deviation(alarm, text)}{cannot_be_stopped(alarm)}"
     text = _(
         "Deviation {deviation} cannot be: it has reached the confidence limit {limit}. The probe or the program "
         "is wrong; compensation is paused."
     )
-    return f"{_deviation(alarm, text)}{_cannot_be_stopped(alarm)}"
+    return f"{_deviation(alarm, text)}{cannot_be_stopped(alarm)}"
 
 
-def _cannot_be_stopped(alarm: Alarm) -> str:
+def cannot_be_stopped(alarm: Alarm) -> str:
     """A sentence where the machine has a bridge that does not carry the decision to stop."""
     session = object_session(alarm)
     carries = select(Connection.carries_decisions).where(Connection.machine_id == alarm.machine_id)

@@ -1,15 +1,16 @@
-"""Taking the report of a machine fault: it raises an alarm, counts up in it, or ends it."""
+"""Faults become alarms: those that a machine reports, and readings that were refused because its program touches too often."""
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from sqlalchemy.orm import Session
 
 from app.access.audit.actions import record
 from app.access.callers import Caller
+from app.db.engine import Database
 from app.db.events import publish
 from app.language.i18n import _
 from app.loop.alarms import actions as alarms
-from app.loop.faults.alarm_kinds import MACHINE_FAULT, Fault
+from app.loop.faults.alarm_kinds import MACHINE_FAULT, TOUCH_COUNT, Fault
 from app.loop.machines import queries as machines
 
 
@@ -44,3 +45,17 @@ def report_fault(session: Session, machine: str, fault: Fault, text: str, active
     record(session, caller.name, "machine fault over", f"alarm/{ended.id}", None, {"fault": fault}, comment)
     publish(session, alarms.news(owner.key, ended))
     return Reported(ended.id, False, ended.count, False)
+
+
+def report_touch_count(database: Database, place: tuple[int, str, int, str], touch: dict[str, Any]) -> None:
+    """Raise *too many touches* about a reading that was refused for them, or count one more on the active one.
+
+    place: of the characteristic, as `Entry` has it. touch: the one too many, as `TouchError` keeps it.
+    """
+    machine_id, machine, characteristic_id, characteristic = place
+    with database.begin() as session:
+        machines.lock_machines(session, [machine_id])
+        raised = alarms.raise_for_characteristic(
+            session, machine_id, characteristic_id, None, TOUCH_COUNT, {"touch": touch}
+        )
+        publish(session, alarms.news(machine, raised) | {"characteristic": characteristic})

@@ -12,11 +12,12 @@ from starlette.concurrency import run_in_threadpool
 
 from app.access.deps import AnyCaller, Operator
 from app.db.engine import Database
-from app.errors import FieldError, NotFound, TooLarge
+from app.errors import FieldError, Invalid, NotFound, TooLarge
 from app.language.i18n import _
 from app.loop.readings import actions, queries
 from app.loop.readings.answers import ReadingAnswer, ReadingDetail
 from app.loop.readings.door import LARGEST_BODY, Directory, answer_of, decoded, store_reading
+from app.loop.readings.miscounted import TooManyTouches
 from app.loop.readings.records import Entry
 from app.loop.readings.schemas import ReadingIn, decode_many
 from app.loop.readings.writer.batch import store_batch
@@ -127,7 +128,12 @@ async def push_batch(
         readings = _looked_up(directory, decode_many(body, datetime.now(UTC), lines=lines))
         for entry in {entry.machine_id: entry for entry, _reading in readings}.values():
             caller.must_at(entry.machine_id, "operator")
-        outcomes = store_batch(database, writer.parameters, readings, writer.idle) if readings else []
+        try:
+            outcomes = store_batch(database, writer.parameters, readings, writer.idle) if readings else []
+        except Invalid as error:
+            if isinstance(refusal := error.__cause__, TooManyTouches) and caller.kind == "machine":
+                writer.refused(refusal.entry, refusal.touch.as_dict())
+            raise
         return outcomes, msgspec.json.encode(_counts(outcomes))
 
     outcomes, counts = await run_in_threadpool(stored)

@@ -19,6 +19,7 @@ from app.errors import FieldError, InbandError, Invalid, NotFound, NotSignedIn, 
 from app.language.i18n import _
 from app.loop.readings import queries
 from app.loop.readings.answers import answer
+from app.loop.readings.miscounted import TooManyTouches
 from app.loop.readings.records import Entry
 from app.loop.readings.schemas import ReadingIn, decode_one
 from app.loop.readings.writer.columnar import Outcome
@@ -136,6 +137,8 @@ async def store_reading(
         entry = await asyncio.to_thread(directory.look_up, reading.characteristic)
     caller.must_at(entry.machine_id, "operator")
     outcome = await writer.submit(entry, reading)
+    if isinstance(outcome, TooManyTouches) and caller.kind == "machine":  # a person reads the answer
+        await asyncio.to_thread(writer.refused, outcome.entry, outcome.touch.as_dict())
     return await answer_to(outcome, database)
 
 

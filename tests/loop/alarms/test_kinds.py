@@ -59,6 +59,7 @@ DATA: dict[str, list[dict[str, Any]]] = {
         {"touch": {"code": "distance", "point": 2, "repeat": 1, "expected": 0.5, "got": 0.8}},
         {"touch": {"code": "missing", "point": 2, "repeat": 1, "expected": 1, "got": 0}},
     ],
+    "touch_count": [{"touch": {"code": "points", "point": 4, "repeat": None, "expected": 3, "got": 4}}],
     "acceptance": [{"least": 2, "m": 3}, {}],
     "offset_limit": [_SIZE],
     "implausible": [_SIZE],

@@ -291,7 +291,9 @@ class TestTouches:
     def test_more_touches_than_there_can_be_are_refused_by_name(self, shop: Shop, touches: list[list[float]]) -> None:
         name = f"{shop.characteristic}-t"
         shop.add(name, variant="indexed", index=180, repeats=2, average_memory=0)
-        assert fields(refused(shop, 422, characteristic=name, touches=touches, measured=None)) == {"touches"}
+        assert fields(refused(shop, 422, shop.admin, characteristic=name, touches=touches, measured=None)) == {
+            "touches"
+        }
         assert shop.call("GET", f"/readings?characteristic={name}")["items"] == []
 
 

@@ -158,6 +158,29 @@ def test_touches_that_cannot_be_of_this_characteristic_are_refused_by_point_and_
     assert checked.call("GET", f"/readings?characteristic={name}")["items"] == []
 
 
+def test_a_machine_that_touches_too_often_is_told_to_stop_and_people_see_it(shop: Shop) -> None:
+    """The program of an unattended lathe: each reading is refused, and it would cut on with nothing decided."""
+    name = f"{shop.characteristic}-v"
+    shop.add(name, variant="along", points=3, index=-8, average_memory=0)
+    body: dict[str, Any] = {"characteristic": name, "touches": [[40.0]] * 4, "key": "k"}
+
+    def refused(path: str, sent: Any, client: Any) -> Any:
+        answer = client.post(f"/api/v1{path}", json=sent)
+        assert answer.status_code == 422
+        return answer.json()
+
+    for path, sent in (("/readings", body), ("/readings/batch", [body | {"touches": [[40.0]] * 3, "key": "j"}, body])):
+        problem = refused(path, sent, shop.machine_client)
+        assert (problem["action"], "Point 4 is one too many" in problem["detail"]) == ("stop", True)
+    assert shop.call("GET", f"/readings?characteristic={name}")["items"] == []
+    [alarm] = shop.alarms()
+    assert (alarm["kind"], alarm["characteristic"], alarm["count"]) == ("touch_count", name, 2)
+    assert alarm["text"].startswith("Points received: 4, expected: 3. Point 4 is one too many. The reading was refused")
+    shop.acknowledge(alarm["id"], "noted", comment="Program corrected")
+    refused("/readings", body, shop.admin)
+    assert shop.alarms() == [], "a person reads the answer"
+
+
 @pytest.mark.parametrize(
     ("touches", "measured", "says"),
     [

@@ -19,9 +19,9 @@ from app.core.probing import Measured, TouchError, measured_value, unmeasured
 from app.core.variants import Results, results_of
 from app.errors import Conflict, FieldError, InbandError, Invalid
 from app.language.i18n import _
+from app.loop.readings.miscounted import TooManyTouches
 from app.loop.readings.records import Entry
 from app.loop.readings.schemas import ReadingIn
-from app.loop.readings.wording import touch_problem
 from app.loop.readings.writer.corrections_in_effect import confirm, corrections_in_effect, issued_total
 from app.loop.readings.writer.opposed import name_correction, pauses, remember
 from app.loop.readings.writer.pending import (
@@ -84,7 +84,7 @@ def decide_reading(pending: PendingWrites, entry: Entry, reading: ReadingIn, now
     parameters = stream.parameters
     if reading.key is not None and (first := _first_with_key(pending, entry, reading.key, reading)):
         return first
-    measured, points, fault = _measured(parameters, reading)
+    measured, points, fault = _measured(entry, parameters, reading)
     tool, in_effect = stream.tool, reading.correction_in_effect
     _refuse_unissued(pending, entry, in_effect)
     sequence = stream.sequence + 1
@@ -189,7 +189,7 @@ def _refuse_unissued(pending: PendingWrites, entry: Entry, in_effect: int | None
         )
 
 
-def _measured(parameters: Parameters, reading: ReadingIn) -> Measured:
+def _measured(entry: Entry, parameters: Parameters, reading: ReadingIn) -> Measured:
     """Return the value, with the mean at each probed point if it came as points that can be believed."""
     if reading.touches is None:
         if reading.first_move_triggered and reading.measured is None:
@@ -205,12 +205,7 @@ def _measured(parameters: Parameters, reading: ReadingIn) -> Measured:
     try:
         value = measured_value(parameters, reading.touches)
     except TouchError as error:
-        message = touch_problem(error)
-        raise Invalid(
-            message,
-            _("Nothing was stored. Correct points or repeats of the characteristic, or what the program sends."),
-            errors=[FieldError("touches", message)],
-        ) from None
+        raise TooManyTouches(entry, error) from None
     return Measured(value.value, ()) if reading.first_move_triggered else value
 
 
@@ -239,7 +234,7 @@ def _first_with_key(pending: PendingWrites, entry: Entry, key: str, reading: Rea
             _("A key names one reading for ever. Give the new reading a key of its own."),
             errors=[FieldError("key", _("This key is taken by a reading that differs in first_move_triggered."))],
         )
-    measured = _measured(first.parameters, reading).value
+    measured = _measured(entry, first.parameters, reading).value
     if round(value - measured, DECIMALS) != 0:
         if here is not None:
             words = _("Key {key} of {characteristic} comes twice: with {first} mm and with {now} mm.")

@@ -7,8 +7,9 @@ for it in a queue of their own, in their order, until it is free.
 
 import asyncio
 import logging
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from time import monotonic
+from typing import Any
 
 from app.db.engine import Database
 from app.errors import Busy, DatabaseAway, OutcomeUnknown
@@ -38,11 +39,15 @@ class _Queue:
         self.task: asyncio.Task[None] | None = None
 
 
-class Writer:
-    """Stores the single readings of a process, one transaction after the other."""
+Refused = Callable[[Entry, dict[str, Any]], object]
 
-    def __init__(self, database: Database) -> None:
+
+class Writer:
+    """Stores the single readings of a process, one transaction after the other. refused: is given the place and the touch of a refusal that people have to see."""
+
+    def __init__(self, database: Database, refused: Refused = lambda _place, _touch: None) -> None:
         self.database = database
+        self.refused = refused
         self.parameters: ParametersCache = {}
         self.idle: list[ReadingStore] = []
         self._store = ReadingStore(database, self.parameters, lock_wait=GIVE_WAY, gives_way=True)

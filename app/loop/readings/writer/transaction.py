@@ -14,6 +14,7 @@ import psycopg
 from app.db.pipeline import Pipeline
 from app.errors import DatabaseAway, InbandError, Invalid, OutcomeUnknown
 from app.language.i18n import _
+from app.loop.readings.miscounted import STOP, TooManyTouches
 from app.loop.readings.records import Entry
 from app.loop.readings.schemas import MOST_ERRORS, ReadingIn
 from app.loop.readings.writer.columnar import FEWEST, ColumnarReadings, Outcome, decide_in_columns
@@ -128,10 +129,12 @@ def refuse_all(outcomes: Sequence[Outcome]) -> None:
         for error in refusal.errors
     ]
     kinds = {type(refusal) for _, refusal in refused}
-    kind = kinds.pop() if len(kinds) == 1 else Invalid
+    miscounted = next((error for _at, error in refused if isinstance(error, TooManyTouches)), None)
+    kind = kinds.pop() if len(kinds) == 1 and miscounted is None else Invalid
     raise kind(
         _("%(count)s of %(all)s readings cannot be taken; the first is [%(first)s]: %(detail)s")
         % {"count": len(refused), "all": len(outcomes), "first": refused[0][0], "detail": refused[0][1].detail},
         _("Nothing of this batch was stored. Correct what is named under errors and send the batch again."),
         errors=errors,
-    )
+        **({} if miscounted is None else STOP),
+    ) from miscounted
