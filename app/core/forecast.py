@@ -6,12 +6,13 @@ Wear does not go on straight: an edge runs in, wears evenly, then steeply (ISO 3
 turning tools). So both ends are moved outwards, with `seen` the parts that the line was fitted over::
 
     soonest = low / (3 + 3 low / (low + seen)) ** widening     a steep end may begin at any moment, also with the next part
-    latest = high * (1 + high / seen) ** widening              wear may slow down, as after a run-in; the further ahead, the more
+    latest = high * (1.5 + high / seen) ** widening            wear may slow down, also shortly before the limit; further ahead, more
 
 *Widening* is what earlier edges needed: the exponent with which 95 % of the forecasts made on them would have held
 (`backtest`; split conformal prediction, Vovk et al. 2005, Algorithmic learning in a random world). Until `ENOUGH` edges are over
 it is never below `PUBLIC_WIDENING`, the exponent that public wear series of other tools need; docs/reference/wear.md
-has the series, and how many forecasts held on tools that it was not tuned on. An edge that breaks cannot be foretold. Lengths are mm.
+has the series, and how many forecasts held on tools that it was not tuned on (`bench/wear.py`). Few edges say little about the
+next: what N of them needed counts (1 + `FEW_LIVES` / N) times, of fewer than `ENOUGH` a quarter more. An edge that breaks cannot be foretold. Lengths are mm.
 """
 
 from collections.abc import Sequence
@@ -24,7 +25,9 @@ from numpy.typing import NDArray
 from app.core.wear import LEVEL, NEAR, Fit, Values, fit, off_of
 
 STEEP = 3.0  # times as fast an edge may wear from the next part on, where widening is 1; far ahead up to twice that
-PUBLIC_WIDENING = 1.4  # exponent that public wear series need: docs/reference/wear.md
+SLOW = 1.5  # times as slowly it may wear from the next part on, where widening is 1
+PUBLIC_WIDENING = 2.0  # exponent that public wear series need: docs/reference/wear.md
+FEW_LIVES = 2.0  # what N lives needed counts (1 + this / N) times; N is ENOUGH at least
 ENOUGH = 8  # tool lives from which on their own exponent alone holds
 LEAST_WIDENING, MOST_WIDENING = (
     0.5,
@@ -32,7 +35,7 @@ LEAST_WIDENING, MOST_WIDENING = (
 )  # a steep end may come though none did before; beyond, an interval says nothing
 LOOKS = (0.3, 0.5, 0.7, 0.9)  # of a tool life: where `backtest` makes a forecast of its end
 SHORTEST_LIFE = 40  # readings of a tool life that a forecast is tested on
-MOST_AHEAD = 10.0  # times as far along the line as a part is ahead, `cone` looks
+MOST_AHEAD = 40.0  # times as far along the line as a part is ahead, `cone` looks
 
 
 class Forecast(NamedTuple):
@@ -74,7 +77,7 @@ def forecast(fit: Fit, limit: float, widening: float = PUBLIC_WIDENING) -> Forec
     >>> w = np.arange(40) * 0.0001 + np.array([0.001, -0.001] * 20)
     >>> f = forecast(wear.fit(np.arange(1, 41), w), 0.0139)
     >>> round(f.parts), round(f.low), round(f.high)
-    (105, 8, 1579)
+    (105, 3, 5046)
     """
     straight = _straight(fit, limit)
     if straight is None:
@@ -90,7 +93,7 @@ def cone(fit: Fit, ahead: Values, widening: float = PUBLIC_WIDENING) -> tuple[Va
     >>> from app.core import wear
     >>> line = wear.fit(np.arange(1, 41), np.arange(40) * 0.0001 + np.array([0.001, -0.001] * 20))
     >>> [ends.round(4).tolist() for ends in cone(line, np.array([0.0, 18.7]), 1.0)]
-    [[0.0017, 0.0029], [0.006, 0.0169]]
+    [[0.0017, 0.0026], [0.006, 0.0169]]
     """
     straight = np.concatenate(([0.0], np.geomspace(0.01, MOST_AHEAD * max(float(ahead.max()), 1.0), 1_000)))
     sooner = np.array([_sooner(fit, distance, widening) for distance in straight])
@@ -112,13 +115,13 @@ def backtest(lives: Sequence[tuple[NDArray[np.int64], Values]]) -> Record:
 
     >>> w = np.arange(200) * 0.0001 + np.array([0.001, -0.001] * 100)
     >>> backtest([(np.arange(1, 201), w)])
-    Record(lives=1, tested=4, held=4, widening=1.4)
+    Record(lives=1, tested=4, held=4, widening=2.0)
     """
     held = counted = 0
     needed: list[float] = []
     widening = PUBLIC_WIDENING
     for sequence, curve in lives:
-        exponents = _needed_of(sequence, curve)
+        exponents = [exponent for _moment, exponent in needed_at(sequence, curve)]
         if exponents:
             held += sum(exponent <= widening for exponent in exponents)
             needed += exponents
@@ -144,13 +147,14 @@ def widening_after(lives: int, taught: float) -> float:
     """The exponent for the next edge, after N lives that taught this one.
 
     >>> widening_after(0, 0.0), widening_after(2, 1.9), widening_after(ENOUGH, 0.8), widening_after(9, 0.0)
-    (1.4, 1.9, 0.8, 0.5)
+    (2.0, 2.375, 1.0, 0.5)
     """
-    return min(MOST_WIDENING, max(LEAST_WIDENING if lives >= ENOUGH else PUBLIC_WIDENING, taught))
+    least = LEAST_WIDENING if lives >= ENOUGH else PUBLIC_WIDENING
+    return min(MOST_WIDENING, max(least, taught * (1 + FEW_LIVES / max(lives, ENOUGH))))
 
 
-def _needed_of(sequence: NDArray[np.int64], curve: Values) -> list[float]:
-    """The exponents that the forecasts of one life needed."""
+def needed_at(sequence: NDArray[np.int64], curve: Values) -> list[tuple[float, float]]:
+    """The exponents that the forecasts of one life needed, each with the moment of the life."""
     if len(curve) < SHORTEST_LIFE:
         return []
     whole = len(curve) - off_of(curve)  # an edge that broke in the end was worn until then
@@ -162,7 +166,7 @@ def _needed_of(sequence: NDArray[np.int64], curve: Values) -> list[float]:
         line = fit(sequence[:upto], curve[:upto])
         straight = None if line is None else _straight(line, limit)
         if line is not None and straight is not None and straight.parts > 0:
-            needed.append(_needed(line, straight, float(end - line.last)))
+            needed.append((share, _needed(line, straight, float(end - line.last))))
     return needed
 
 
@@ -172,7 +176,7 @@ def _needed(fit: Fit, straight: Forecast, truth: float) -> float:
         return 0.0
     if truth < straight.low:
         return log(straight.low / truth) / log(_steep(fit, straight.low))
-    return log(truth / straight.high) / log(1 + straight.high / _seen(fit))
+    return log(truth / straight.high) / log(SLOW + straight.high / _seen(fit))
 
 
 def _seen(fit: Fit) -> int:
@@ -192,7 +196,7 @@ def _sooner(fit: Fit, parts: float, widening: float) -> float:
 
 def _later(fit: Fit, parts: float, widening: float) -> float:
     """The parts after which slower wear may only be where the line is after `parts`."""
-    return float(parts * (1 + parts / _seen(fit)) ** widening)
+    return float(parts * (SLOW + parts / _seen(fit)) ** widening)
 
 
 def _straight(fit: Fit, limit: float) -> Forecast | None:

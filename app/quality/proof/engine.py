@@ -34,7 +34,7 @@ from app.core.wear import fit
 from app.quality.proof import engine_of_gauges as gauges
 from app.quality.proof import geometry
 from app.quality.proof.example_input import Given, Got, readings_of
-from app.quality.proof.wear_lives import life, operation
+from app.quality.proof.wear_lives import life, operation, steeper
 
 
 def decision(given: Given) -> Got:
@@ -347,7 +347,7 @@ def parts_left(given: Given) -> Got:
     rng = np.random.default_rng(given["seed"])
     held: dict[float, list[bool]] = {share: [] for share in LOOKS}
     for _operation in range(given["operations"]):
-        of = operation(rng)
+        of = steeper(rng, given["steep"]) if "steep" in given else operation(rng)
         over = [life(of, rng) for _edge in range(given["edges_before"])]
         widening = backtest([(np.arange(1, len(curve) + 1), curve) for curve in over]).widening
         curve = life(of, rng)
