@@ -12,9 +12,12 @@ of D over what it misses of x is the gain, a weighted least-squares line::
 
     gain = sum(v_D v_x / F) / sum(v_x^2 / F),    error = scatter / sqrt(sum(v_x^2 / F))
 
-over the parts since the first of the two; over those of one correction alone it is the gain of that correction. The scatter is the
-median step from part to part over that of a normal distribution, so wear from part to part is in it, and a chip or an edge that
-breaks is not. The limits below are those with which simulated tool lives are never paused (docs/reference/gain.md).
+over the parts since the first of the two; over those of one correction alone it is the gain of that correction. Parts count by the
+corrections they were cut with, so parts on the way only say more of the level; smaller corrections that answer their scatter
+meanwhile, often against the sense of the two, are in x and are not judged. The scatter is that of the steps from part to part, large
+ones cut off, so wear from part to part is in it, and a chip or an edge that breaks hardly is. While few parts have shown it, it is
+taken for larger, as far as R34 leaves room. The limits below are those with which simulated tool lives are never paused
+(docs/reference/gain.md).
 
 A gain over many corrections, while the machine warms up, is found by `app.core.effect`. Lengths are mm.
 """
@@ -30,28 +33,34 @@ from app.core.compiled import compiled
 Floats = NDArray[np.float64]
 
 LONGEST = 48  # parts that are looked at
-# Parts before the first correction that count; on either side of a correction, that say what it did.
+# Parts before a correction that count; on either side of one, that say what it did.
 BEFORE, NEAR = 3, 5
+RECENT = 16  # parts among which both corrections took effect
 LEVEL_STEP = 0.1  # variance of a step of the level over that of the scatter
 # Parts before the first correction that show how the size wears or warms up; the sum of squares that a slope of none is worth.
 TREND, SHRUNK = 17, 60.0
 OPPOSITE = -0.2  # the gain is below this: with wear, that of corrections that do nothing is a little below 0
-# Standard errors that the gain is below 0, the same where both ask for more than this many times the scatter, and below half.
-SURE_OPPOSITE, LARGE, SURE_OF_LARGE, SURE_NOT_WEAK = 3.0, 2.5, 2.0, 4.0
-LARGEST_ERROR = 0.27  # of the gain
+SURE_OPPOSITE, SURE_NOT_WEAK = 2.0, 4.5  # standard errors that the gain is below 0, and below half
+LARGEST_ERROR = 0.36  # of the gain
 LEAST = 1.5  # times the scatter that each of the two asks for: smaller ones say nothing
+UNLIKE = (
+    5.0  # times that one of the two may be as large as the other: those between that answer the scatter say nothing
+)
 NOT_DONE, FARTHEST = 0.4, -3.5  # the gain of each of the two alone: beyond, something else has happened, an edge broke
 # And that of the second, the larger one where a sign is wrong: an edge that wears off quickly only seems to undo it.
 AGAIN = -0.1
-SURE_FIRST, SURE_SECOND = 1.9, 3.0  # standard errors that they are below 1, and below half
-# Until this many parts have shown the scatter, the first correction is this many times what it seems to be, and the gain below this.
-KNOWN, FRESH, FRESH_OPPOSITE = 20, 8.0, -0.3
+SURE_FIRST, SURE_SECOND = 1.9, 2.0  # standard errors that they are below 1, and below half
 # Standard deviations of a step between two parts of one correction: the process moved by itself, as where an edge breaks.
 ITSELF = 4.0
+# Standard deviations at which a step counts no more for the scatter; what is left of the variance of a normal distribution then.
+FAR, LEFT = 2.5, 0.978
+# By how much larger the scatter may be than few parts show: 1 + FEW / parts cubed; never more than R34 over MOST.
+FEW, MOST = 900.0, 2.0
+KNOWN = 20  # parts that show what the readings are rounded to
 # A gain that each of two corrections exceeds where the offset has another unit; times the scatter that each has done; how many times
 # the gain of one that of the other may be; how many times the first the second asks for, to take back what that has done.
 FAR_TOO_STRONG, CLEARLY, ALIKE, BACK = 8.0, 12.0, 1.5, -4.0
-PRIOR, FEW = 3.0, 1.0  # parts that the expected scatter is worth; by how much surer one must be while it is not known
+PRIOR = 3.0  # parts that the expected scatter is worth
 NM = 1e-6
 
 
@@ -92,20 +101,22 @@ def expected_scatter(zero_range: float, averaging_limit: float) -> float:
     return max(zero_range / 3, averaging_limit / 10, 0.0001)
 
 
-def opposed(deviation: Floats, compensated: Floats, factor: float, begin: int, expected: float) -> Opposed | None:
+def opposed(
+    deviation: Floats, compensated: Floats, factor: float, begin: int, expected: float, averaging_limit: float
+) -> Opposed | None:
     """The two newest corrections, if what they did is clearly against what they asked.
 
     deviation, compensated: of the newest parts, in order; those before `begin` were cut before a tool change, a manual edit or a
-    resume, and tell of the scatter alone. expected: the scatter to begin with (`expected_scatter`).
+    resume, and tell of the scatter alone. expected: the scatter to begin with (`expected_scatter`). averaging_limit: R34.
 
     >>> d, s = np.array([0.005, 0.0103, 0.020]), np.array([0.0, 0.005, 0.0153])
-    >>> found = opposed(d, s, 1.0, 0, expected_scatter(0.001, 0.004))
+    >>> found = opposed(d, s, 1.0, 0, expected_scatter(0.001, 0.004), 0.004)
     >>> [(round(step.asked, 4), round(step.done, 4)) for step in (found.first, found.second)], round(found.gain, 2)
     ([(-0.005, 0.0053), (-0.0103, 0.0097)], -0.97)
-    >>> opposed(np.array([0.005, 0.0003, 0.0052]), s, 1.0, 0, 0.0005) is None
+    >>> opposed(np.array([0.005, 0.0003, 0.0052]), s, 1.0, 0, 0.0005, 0.004) is None
     True
     """
-    judged = Judged(*judge(deviation, compensated, factor, begin, expected))
+    judged = Judged(*judge(deviation, compensated, factor, begin, expected, averaging_limit))
     if not judged.opposed:
         return None
     first, second = _steps(deviation, compensated, factor, (begin, judged.first, judged.second))
@@ -141,7 +152,7 @@ def overdone(deviation: Floats, compensated: Floats, factor: float, expected: fl
     >>> round(gain, 1), overdone(np.array([0.0015, 0.0366, 0.0001]), np.array([0.0, -0.0015, -0.0381]), -1.0, 0.0003)
     (25.4, None)
     """
-    start, first, second = newest_two(compensated, 0)
+    start, first, second = newest_two(compensated, 0, NM, np.inf)
     if first == 0:
         return None
     steps = _steps(deviation, compensated, factor, (start, first, second))
@@ -163,7 +174,7 @@ def against(deviation: Floats, compensated: Floats, factor: float, expected: flo
     >>> round(found.asked, 3), round(found.done, 3), against(np.array([0.012, 0.3]), np.array([0.006, 0.042]), 1.0, 0.0003)
     (-0.036, 0.036, None)
     """
-    _start, before, newest = newest_two(compensated, 0)
+    _start, before, newest = newest_two(compensated, 0, NM, np.inf)
     if newest == 0:
         return None
     step = _step(deviation, compensated, factor, (before, newest, len(deviation)))
@@ -171,17 +182,22 @@ def against(deviation: Floats, compensated: Floats, factor: float, expected: flo
     return step if clear and FARTHEST <= step.done / step.asked <= OPPOSITE else None
 
 
-def newest_two(compensated: Floats, begin: int) -> tuple[int, int, int]:
-    """Return where the correction before the newest two, and those two, took effect; 0 where there are not two."""
-    first, second = 0, 0
+def newest_two(compensated: Floats, begin: int, least: float, alike: float) -> tuple[int, int, int]:
+    """Return where the correction before the newest two, and those two, took effect; 0 where there are not two.
+
+    least: changes of the offset that are no larger, mm, do not count; nor does one that the other exceeds `alike` times.
+    """
+    first, second, size = 0, 0, 0.0
     for i in range(len(compensated) - 1, begin, -1):
-        if abs(compensated[i] - compensated[i - 1]) > NM:
-            if second == 0:
-                second = i
-            elif first == 0:
-                first = i
-            else:
-                return i, first, second
+        change = abs(compensated[i] - compensated[i - 1])
+        if change <= least or change * alike < size:
+            continue
+        if first:
+            return i, first, second
+        if second == 0 or change > size * alike:
+            second, size = i, change
+        else:
+            first = i
     return begin, first, second
 
 
@@ -204,59 +220,59 @@ def trend_before(deviation: Floats, compensated: Floats, factor: float, low: int
     return (tw - t_sum * w_sum / count) / (tt - t_sum * t_sum / count + SHRUNK)
 
 
-def scatter_of(deviation: Floats, compensated: Floats, factor: float, expected: float) -> float:
-    """Return the standard deviation of the scatter: the median step from part to part over that of a normal distribution.
-
-    What corrections did is taken out by the line through all of them, whatever their gain; `expected` is worth `PRIOR` parts more.
-    It is never below half a step of what the readings are rounded to.
-    """
-    count = len(deviation)
-    xx, xd, smallest = 0.0, 0.0, np.inf
-    for i in range(1, count):
+def line_through(deviation: Floats, compensated: Floats, factor: float, low: int, high: int) -> float:
+    """Return the gain of all corrections between two parts: least squares, the size steps from part to part."""
+    xx, xd = 0.0, 0.0
+    for i in range(low + 1, high):
         asked = (compensated[i - 1] - compensated[i]) / factor
-        step = deviation[i] - deviation[i - 1]
         xx += asked * asked
-        xd += asked * step
-        if NM < abs(step) < smallest:
-            smallest = abs(step)
-    gain = xd / xx if xx > 0 else 0.0
+        xd += asked * (deviation[i] - deviation[i - 1])
+    return xd / xx if xx > 0 else 0.0
+
+
+def scatter_of(deviation: Floats, compensated: Floats, factor: float, expected: float, first: int) -> float:
+    """Return the standard deviation of the scatter: the steps from part to part, of which large ones count as `FAR` (Huber).
+
+    What corrections did is taken out by a line through those before `first` and one through the others, whatever their gains;
+    `expected` is worth `PRIOR` parts more. It is never below half a step of what the readings are rounded to.
+    """
+    count, smallest = len(deviation), np.inf
+    before = line_through(deviation, compensated, factor, 0, first)
+    since = line_through(deviation, compensated, factor, first - 1, count)
     steps = np.empty(count - 1)
     for i in range(1, count):
         asked = (compensated[i - 1] - compensated[i]) / factor
-        steps[i - 1] = abs(deviation[i] - deviation[i - 1] - gain * asked)
-    middle = float(np.median(steps)) * 1.4826 / sqrt(2.0)
+        step = deviation[i] - deviation[i - 1]
+        if NM < abs(step) < smallest:
+            smallest = abs(step)
+        steps[i - 1] = abs(step - (before if i < first else since) * asked)
+    freedom = max(count - 3.0, 0.0)
+    scatter = float(np.median(steps)) * 1.4826 / sqrt(2.0)
+    if freedom:
+        for _nearer in range(4):
+            far, squares = FAR * sqrt(2.0) * scatter, 0.0
+            for step in steps:
+                squares += min(step, far) ** 2 / 2
+            scatter = sqrt(squares / freedom / LEFT)
     if count >= KNOWN and smallest < np.inf:
-        middle = max(middle, smallest / 2)
-    freedom = count - 2.0
-    return sqrt((PRIOR * expected * expected + freedom * middle * middle) / (PRIOR + freedom))
+        scatter = max(scatter, smallest / 2)
+    return sqrt((PRIOR * expected * expected + freedom * scatter * scatter) / (PRIOR + freedom))
 
 
-@compiled
-def judge(
-    deviation: Floats, compensated: Floats, factor: float, begin: int, expected: float
-) -> tuple[bool, int, int, float, float]:
-    """Judge as `opposed` does; the result is that of `Judged`."""
-    count = len(deviation)
-    start, first, second = newest_two(compensated, begin)
-    if first == 0:
-        return False, 0, 0, 0.0, 0.0
-    asked_first = (compensated[first - 1] - compensated[first]) / factor
-    asked_second = (compensated[second - 1] - compensated[second]) / factor
-    grown = deviation[count - 1] - deviation[first - 1]
-    if asked_first * asked_second < 0 or grown * asked_second >= 0 or deviation[count - 1] * asked_second >= 0:
-        return False, first, second, 0.0, 0.0
-    scatter = scatter_of(deviation, compensated, factor, expected)
-    start, itself = max(start, first - BEFORE), ITSELF * sqrt(2.0) * scatter
-    trend = trend_before(deviation, compensated, factor, begin, first, itself)
+def regressed(
+    deviation: Floats, compensated: Floats, factor: float, places: tuple[int, int, int], trend: float, scatter: float
+) -> tuple[float, float, bool]:
+    """Return the sums of v_x^2 / F and of v_D v_x / F, and if the size moved by itself since the first of the corrections.
+
+    places: the part to begin with, the end, and where the first of the corrections took effect.
+    """
+    start, end, first = places
     level_d, level_x = deviation[start], -compensated[start] / factor
-    p = 1.0 + LEVEL_STEP
-    xx, xd, xx_first, xd_first = 0.0, 0.0, 0.0, 0.0
-    for i in range(start + 1, count):
-        if i == second:
-            xx_first, xd_first = xx, xd
-        if abs(compensated[i] - compensated[i - 1]) <= NM and abs(deviation[i] - deviation[i - 1]) > itself:
-            if i > first:
-                return False, first, second, 0.0, 0.0
+    p, xx, xd, moved = 1.0 + LEVEL_STEP, 0.0, 0.0, False
+    for i in range(start + 1, end):
+        step, asked = abs(deviation[i] - deviation[i - 1]), abs((compensated[i] - compensated[i - 1]) / factor)
+        if asked <= LEAST * scatter and step > ITSELF * sqrt(2.0) * scatter + 2 * asked:
+            moved |= i > first
             level_d, level_x, p = deviation[i], -compensated[i] / factor, 1.0 + LEVEL_STEP
             continue
         variance = p + 1.0
@@ -267,22 +283,47 @@ def judge(
         level_d += trend + k * missed_d
         level_x += k * missed_x
         p = p - k * p + LEVEL_STEP
-    gain, error = xd / xx, scatter / sqrt(xx)
-    first_gain, second_gain = xd_first / xx_first, (xd - xd_first) / (xx - xx_first)
-    least = min(abs(asked_first), abs(asked_second))
-    surer = 1 + FEW / (PRIOR + count - 2)
+    return xx, xd, moved
+
+
+@compiled
+def judge(
+    deviation: Floats, compensated: Floats, factor: float, begin: int, expected: float, averaging_limit: float
+) -> tuple[bool, int, int, float, float]:
+    """Judge as `opposed` does; the result is that of `Judged`."""
+    count = len(deviation)
+    scatter, first, second = expected, 0, 0
+    for _again in range(2):  # then by the scatter that they leave
+        least = LEAST * scatter * abs(factor)
+        _start, first, second = newest_two(compensated, max(begin, count - RECENT), least, UNLIKE)
+        if first == 0:
+            return False, 0, 0, 0.0, 0.0
+        scatter = scatter_of(deviation, compensated, factor, expected, first)
+    asked_first = (compensated[first - 1] - compensated[first]) / factor
+    asked_second = (compensated[second - 1] - compensated[second]) / factor
+    start = max(begin, first - BEFORE)
+    trend = trend_before(deviation, compensated, factor, begin, first, ITSELF * sqrt(2.0) * scatter)
+    xx, xd, moved = regressed(deviation, compensated, factor, (start, count, first), trend, scatter)
+    xx_first, xd_first, _moved = regressed(deviation, compensated, factor, (start, second, first), trend, scatter)
+    start = max(first, second - BEFORE)
+    xx_second, xd_second, _moved = regressed(deviation, compensated, factor, (start, count, second), trend, scatter)
+    if moved or min(xx, xx_first, xx_second) <= 0:
+        return False, first, second, 0.0, 0.0
+    shown = max(count - 3.0, 0.0) + 1.0
+    largest = max(scatter, min(scatter * (1 + FEW / shown**3), averaging_limit / MOST))
+    gain, error = xd / xx, largest / sqrt(xx)
+    first_gain, second_gain = xd_first / xx_first, xd_second / xx_second
     clearly = (
         gain < OPPOSITE
-        and gain + (SURE_OF_LARGE if least > LARGE * scatter else SURE_OPPOSITE) * error < 0
-        and gain + SURE_NOT_WEAK * surer * error < 0.5
+        and gain + SURE_OPPOSITE * error < 0
+        and gain + SURE_NOT_WEAK * error < 0.5
         and error < LARGEST_ERROR
-        and least > LEAST * scatter
-        and (count >= KNOWN or (abs(asked_first) > FRESH * scatter and gain < FRESH_OPPOSITE))
+        and min(abs(asked_first), abs(asked_second)) > LEAST * largest
     )
     each = (
         FARTHEST < first_gain < NOT_DONE
         and FARTHEST < second_gain < AGAIN
-        and first_gain + SURE_FIRST * scatter / sqrt(xx_first) < 1
-        and second_gain + SURE_SECOND * scatter / sqrt(xx - xx_first) < 0.5
+        and first_gain + SURE_FIRST * largest / sqrt(xx_first) < 1
+        and second_gain + SURE_SECOND * largest / sqrt(xx_second) < 0.5
     )
     return clearly and each, first, second, gain, error

@@ -37,6 +37,15 @@ class Loop:
             self.apply(answer["correction"])
         return answer
 
+    def part_before(self, answers: list[Any], scatter: float) -> Any:
+        """One part, cut before the corrections of these answers are applied."""
+        offset, last = self.offset, self.last
+        for answer in answers:
+            if answer["correction"] and answer["action"] == "correct":
+                self.apply(answer["correction"])
+        size = round(self.size + self.effect * offset * 1000 + scatter, 3)
+        return self.shop.read(size, self.key, correction_in_effect=last)
+
     def apply(self, correction: Any) -> None:
         self.offset = round(self.offset + correction["amount"], 9)
         self.last = correction["number"]
@@ -69,6 +78,18 @@ def test_a_wrong_sign_is_stopped_by_the_second_correction(loop: Loop) -> None:
     assert shop.call("GET", f"/machines/{shop.machine}/corrections?status=pending")["items"] == []
     assert loop.part()["reason"]["code"] == "paused"
     assert shop.read(40.0, shop.characteristic)["action"] == "correct"  # another tool
+
+
+def test_a_part_on_the_way_does_not_hide_a_wrong_sign(shop: Shop) -> None:
+    """Each part is cut before the correction of the one before is applied: small corrections of its scatter come between."""
+    loop, chance, answers = Loop(shop), np.random.default_rng(16), list[Any]()
+    shop.call("PATCH", f"/characteristics/{loop.key}", parameters={"zero_range": 0.0005}, reason="follows each part")
+    while not answers or answers[-1]["reason"]["code"] != "paused":
+        answers.append(loop.part_before(answers[-1:], round(float(chance.normal(0, 0.5)), 2)))
+        assert abs(answers[-1]["deviation"]) < 0.025, "four times as far off as it was, and stopped"
+    asked = [each["correction"]["amount"] for each in answers if each["correction"]]
+    assert sum(abs(amount) > 3 * 0.0005 for amount in asked) == 2
+    assert len(asked) > 2
 
 
 def test_what_was_before_the_resume_no_longer_counts(loop: Loop) -> None:

@@ -46,7 +46,7 @@ def compile_now() -> None:
     none = np.zeros(0, np.int64)
     quiet_run(0, np.zeros(0), none, rows_of([]), none, np.zeros(0), Quiet.room(0))
     table([fixed(none, ">i8")], 0)
-    judge(np.zeros(3), np.zeros(3), 1.0, 0, 1.0)
+    judge(np.zeros(3), np.zeros(3), 1.0, 0, 1.0, 1.0)
 
 
 class _Group:

@@ -41,6 +41,7 @@ def pauses(pending: PendingWrites, stream: PendingStream, newest: Part) -> Pendi
         parameters.factor,
         begin,
         expected_scatter(parameters.zero_range, parameters.averaging_limit),
+        parameters.averaging_limit,
     )
     if found is None:
         return None
