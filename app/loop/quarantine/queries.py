@@ -123,10 +123,10 @@ def _is_tool(current: CurrentCharacteristic) -> bool:
 
 def _between(session: Session, row: AlarmRow, characteristic: Characteristic, doubt: Doubt) -> Iterator[Between]:
     history = history_of(session, row.alarm, characteristic.id, doubt)
-    measured = {known.part for known in history.known.values()}
+    named = {known.part for known in history.known.values()}
     first = min(history.known, default=0)
     for stretch in stretches(history.cuts):
-        rows, unnumbered = _listed(session, row, characteristic, history, stretch, measured)
+        rows, unnumbered = _listed(session, row, characteristic, history, stretch, named)
         is_open = stretch.until is None and _is_last(session, row, stretch)
         cut_short = history.cut_short and stretch.since is None and any(first in part.numbers for part in stretch.parts)
         if rows or is_open:
@@ -153,17 +153,21 @@ def _listed(
     characteristic: Characteristic,
     history: History,
     stretch: Stretch,
-    measured: set[str | None],
+    named: set[str | None],
 ) -> tuple[tuple[Listed, ...], bool]:
-    """The rows of a stretch, those without a reading among them, and whether names leave it open how many there are."""
+    """The rows of a stretch, those without a reading among them, and whether names leave it open how many there are.
+
+    named: parts that are listed or measured already; those of these rows are added.
+    """
+    before, after = _neighbours(history, stretch)
     others = _others(session, row, characteristic, history, stretch)
     rows: list[Listed] = []
-    named = set(measured)
-    unnumbered, last = False, history.known.get(stretch.since or 0)
+    unnumbered, last, same_edge = False, before, stretch.since is not None
     steps: list[AffectedPart | None] = [*stretch.parts, None]
     for step in steps:
-        known = history.known[step.numbers[-1]] if step else history.known.get(stretch.until or 0)
-        offset = last.offset if last and known and last.offset == known.offset else None
+        known = history.known[step.numbers[-1]] if step else after
+        same_edge &= step is not None or stretch.until is not None
+        offset = last.offset if last and known and same_edge and last.offset == known.offset else None
         order = _order_of(last, known)
         names: tuple[str, ...] | int | None = ()
         if last and known:
@@ -184,8 +188,25 @@ def _listed(
                     characteristic, known.part, known.found, known, known.order, offset=known.offset, again=step.again
                 )
             )
-        last = known or last
+        last, same_edge = known or last, True
     return tuple(rows), unnumbered
+
+
+def _neighbours(history: History, stretch: Stretch) -> tuple[Known | None, Known | None]:
+    """The readings about a stretch: those certainly good on its edge, else the nearest of another edge, if there is one.
+
+    Which edge has cut a part without a reading between two edges, nobody knows.
+    """
+    known = history.known
+    before, after = (known[end] if end is not None else None for end in (stretch.since, stretch.until))
+    own = [known[number].cut_at for part in stretch.parts for number in part.numbers]
+    own += [each.cut_at for each in (before, after) if each]
+    others = [known[cut.number] for cut in history.cuts if cut.number and cut.life != stretch.life]
+    if own and before is None:
+        before = max((each for each in others if each.cut_at < min(own)), key=lambda each: each.cut_at, default=None)
+    if own and after is None:
+        after = min((each for each in others if each.cut_at > max(own)), key=lambda each: each.cut_at, default=None)
+    return before, after
 
 
 def _order_of(last: Known | None, known: Known | None) -> str | None:
@@ -212,8 +233,9 @@ def _others(
     session: Session, row: AlarmRow, characteristic: Characteristic, history: History, stretch: Stretch
 ) -> list[tuple[datetime, str]]:
     """Parts that readings of the machine's other characteristics name, in the order of cutting, about the time of a stretch."""
+    before, after = _neighbours(history, stretch)
     times = [history.known[number].received_at for part in stretch.parts for number in part.numbers]
-    times += [history.known[end].received_at for end in (stretch.since, stretch.until) if end is not None]
+    times += [each.received_at for each in (before, after) if each]
     if not times:
         return []
     query = (
@@ -227,7 +249,7 @@ def _others(
         .order_by(Reading.received_at)
         .limit(MOST_OTHERS)
     )
-    if stretch.until is not None:
+    if after is not None:
         query = query.where(Reading.received_at <= max(times))
     return sorted((at, part) for at, part in session.execute(query) if part is not None)
 

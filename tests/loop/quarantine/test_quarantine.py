@@ -59,9 +59,34 @@ def test_parts_since_the_last_good_one_are_listed_with_what_they_were_cut_with(s
     cut(shop, 0.0, 5, "SN-0005")  # late, and cut after it: the list begins later
     assert names(affected(shop, alarm)) == ["SN-0006", "SN-0007"]
     shop.acknowledge(alarm, "tool_replaced", offset=0.0)
-    cut(shop, 9.0, 9, "SN-0009")  # another edge
-    assert names(affected(shop, alarm)) == ["SN-0006", "SN-0007"]
-    assert not affected(shop, alarm)["stretches"][0]["open"]
+    cut(shop, 9.0, 9, "SN-0009")  # another edge; nobody knows which has cut the eighth
+    found = affected(shop, alarm)
+    assert names(found) == ["SN-0006", "SN-0007", "SN-0008"]
+    assert [part["offset"] for part in found["stretches"][0]["parts"]] == [0.0, 0.0, None]
+    assert not found["stretches"][0]["open"]
+
+
+def test_parts_without_a_reading_at_a_tool_change_are_listed_and_no_later_ones(shop: Shop) -> None:
+    """One in five is measured here, every part of another characteristic; the worn edge is changed between two readings."""
+    other = shop.another("length", tool_memory=7)
+
+    def others(*parts: int) -> None:
+        for part in parts:
+            cut(shop, 0.0, part, f"X-{part}", characteristic=other)
+
+    cut(shop, 0.0, 5, "A-5")
+    cut(shop, 350.0, 10, "A-10")
+    (alarm,) = shop.alarms()
+    shop.acknowledge(alarm["id"], "tool_replaced", offset=0.0)
+    others(11, 13)
+    cut(shop, 40.0, 15, "A-15")  # the new edge is set wrong
+    others(17)
+    cut(shop, 0.0, 20, "A-20")
+    others(21, 22)
+    assert set(names(affected(shop, alarm["id"]))) == {*(f"A-{part}" for part in range(6, 15)), "X-11", "X-13"}
+    (oversize,) = (each for each in shop.alarms() if each["kind"] == "oversize")
+    wrong = {*(f"A-{part}" for part in range(11, 20)), "X-11", "X-13", "X-17"}
+    assert set(names(affected(shop, oversize["id"]))) == wrong
 
 
 def test_offset_and_a_correction_that_came_too_late_are_said_of_each_part(shop: Shop) -> None:
