@@ -10,6 +10,7 @@ import app
 from app.core.compile_now import compile_each
 from app.loop.readings.writer.columnar import compile_now
 from app.quality.proof import queries as proofs
+from app.simulators import trying
 from app.web.templates import environment
 from tests import one_connection, quick_passwords  # noqa: F401 - they replace what they are about
 
@@ -22,6 +23,7 @@ with Path(__file__).open() as lock:  # what one of several compiles, the others 
     compile_now()
     for _ in compile_each():
         pass
+trying.SPEED *= 10  # the simulated lathe of an empty plant: its first parts in a second
 proofs.proof()  # each server would prove its statistics again, half a minute after its start
 for name in environment().list_templates():
     environment().get_template(name)
