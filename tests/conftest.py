@@ -33,7 +33,7 @@ from xdist import plugin as xdist_plugin
 
 from app import HOUSE
 from app.db import migrate
-from app.db.embedded import EmbeddedServer
+from app.db.embedded import EmbeddedServer, make_data_dir
 from app.db.engine import Database
 from tests import chance, forked, keeper, one_connection, quick_passwords  # noqa: F401 - the last two replace what they are about
 from tests.db.first_program import make_first_program
@@ -276,6 +276,27 @@ def first_program(postgres: str, first_program_template: str) -> Iterator[str]:
         connection.execute(f"CREATE DATABASE {first_program_template}_copy TEMPLATE {first_program_template}")
     yield url
     drop_database(url)
+
+
+@pytest.fixture(scope="session")
+def whole_cluster(shared_dir: Path) -> Path:
+    """A data folder with a PostgreSQL of its own that has Inband's schema, and has ended in order: for `copied`."""
+    folder = (keeper.in_memory() or shared_dir) / "whole"
+    with (shared_dir / "whole.lock").open("w") as lock:
+        fcntl.flock(lock, fcntl.LOCK_EX)
+        if not folder.exists():
+            made = EmbeddedServer(folder.with_name("whole.new"), {"fsync": "off"})
+            migrate.upgrade(made.start())
+            made.stop()
+            made.data_dir.rename(folder)
+    return folder
+
+
+def copied(whole: Path, data_dir: Path) -> Path:
+    """A data folder as that one: to make a PostgreSQL and its schema takes ten times as long as to start it."""
+    make_data_dir(data_dir)
+    subprocess.run(["cp", "-a", whole / "postgres", data_dir], check=True)
+    return data_dir
 
 
 @pytest.fixture(scope="session")

@@ -19,9 +19,9 @@ from app import HOUSE, __version__
 from app.db import migrate
 from app.db.embedded import EmbeddedServer
 from tests import keeper
-from tests.conftest import TLS, NewDatabase, RunServer, Server, free_port, in_database, short_folder, wait_ready
+from tests.conftest import TLS, NewDatabase, RunServer, Server, copied, free_port, in_database, short_folder, wait_ready
 from tests.db.clusters import wait_for
-from tests.forked import inband
+from tests.forked import Forked, inband
 
 
 @pytest.fixture
@@ -32,8 +32,7 @@ def data_dir() -> Iterator[Path]:
 
 def test_a_fresh_start_on_the_embedded_database(data_dir: Path, tmp_path: Path) -> None:
     port, stderr = free_port(), tmp_path / "stderr"
-    where = ["--data-dir", str(data_dir)]
-    command = [sys.executable, "-m", "app", "serve", "--port", str(port), *where]
+    command = [sys.executable, "-m", "app", "serve", "--port", str(port), "--data-dir", str(data_dir)]
     with (
         stderr.open("wb") as log,
         subprocess.Popen(command, cwd=HOUSE, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=log) as process,
@@ -45,7 +44,23 @@ def test_a_fresh_start_on_the_embedded_database(data_dir: Path, tmp_path: Path) 
         assert link is not None, "no administrator yet, so there is an invitation"
         assert httpx.get(link.group(), follow_redirects=True, timeout=60, verify=TLS).status_code == 200
 
-        # both work while the server runs, and what is meant for programs is alone on standard output
+        postgres = EmbeddedServer(data_dir).pid
+        process.send_signal(signal.SIGTERM)
+        out, _ = process.communicate(timeout=60)
+        assert (process.returncode, out) == (0, b"")
+        assert postgres is not None
+        assert EmbeddedServer(data_dir).pid is None
+        assert "Traceback" not in stderr.read_text()
+
+
+def test_commands_work_while_a_server_runs_on_the_embedded_database(
+    data_dir: Path, whole_cluster: Path, tmp_path: Path
+) -> None:
+    """What is meant for programs is alone on standard output."""
+    port, stderr, where = free_port(), tmp_path / "stderr", ["--data-dir", str(copied(whole_cluster, data_dir))]
+    server = Forked(["serve", "--port", str(port), *where], stderr)
+    try:
+        wait_ready(f"http://127.0.0.1:{port}", server, stderr)
         added = inband(
             "user", "add", "anna", "--role", "admin", "--password-stdin", *where, typed="horse battery staple\n"
         )
@@ -56,14 +71,9 @@ def test_a_fresh_start_on_the_embedded_database(data_dir: Path, tmp_path: Path) 
         headers = {"Authorization": f"Bearer {key.stdout.rstrip()}"}
         machines = httpx.get(f"http://127.0.0.1:{port}/api/v1/machines", headers=headers, timeout=60, verify=TLS)
         assert machines.json()["items"] == []
-
-        postgres = EmbeddedServer(data_dir).pid
-        process.send_signal(signal.SIGTERM)
-        out, _ = process.communicate(timeout=60)
-        assert (process.returncode, out) == (0, b"")
-        assert postgres is not None
-        assert EmbeddedServer(data_dir).pid is None
-        assert "Traceback" not in stderr.read_text()
+    finally:
+        server.terminate()
+        assert server.wait(60) == 0
 
     checked = inband("check", *where)
     assert checked.returncode == 0, checked.stderr
@@ -141,12 +151,14 @@ if __name__ == "__main__":
         for workers in (1, 2)
     ],
 )
-def test_it_ends_whatever_works_on(data_dir: Path, tmp_path: Path, what: str, workers: int) -> None:
+def test_it_ends_whatever_works_on(
+    data_dir: Path, whole_cluster: Path, tmp_path: Path, what: str, workers: int
+) -> None:
     """And with it the database, in order."""
     program, port, stderr = tmp_path / "stubborn.py", free_port(), tmp_path / "stderr"
     program.write_text(PROGRAM.format(what=STUBBORN[what]))
     command = [sys.executable, str(program), "serve", "--port", str(port)]
-    command += ["--data-dir", str(data_dir), "--workers", str(workers)]
+    command += ["--data-dir", str(copied(whole_cluster, data_dir)), "--workers", str(workers)]
     with (
         stderr.open("wb") as log,
         subprocess.Popen(command, cwd=HOUSE, env=os.environ | {"PYTHONPATH": str(HOUSE)}, stderr=log) as process,

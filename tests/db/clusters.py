@@ -16,10 +16,10 @@ from typing import Any
 
 import psycopg
 
-from app.db import migrate
 from app.db.binaries import binary
 from app.db.embedded import ENVIRONMENT, EmbeddedServer, _children
 from app.db.run_as import give
+from tests.conftest import copied
 
 NODES = ("one", "two", "three")
 ALWAYS = {"fsync": "off"}  # no test pulls the plug
@@ -87,21 +87,18 @@ class Cluster:
         """Those that run and are not written to."""
         return [node for node in self.nodes if node is not self.primary and node.pid is not None]
 
-    def start(self) -> None:
-        """Make them all, and begin."""
-        migrate.upgrade(self.primary.start())
+    def start(self, whole: Path) -> None:
+        """Make them all from a data folder that has Inband's schema, and begin."""
+        copied(whole, self.primary.data_dir)
+        for node in self.nodes:
+            node.options |= self._settings(node)  # each has all that it needs to change its part
+        self.primary.start()
         with psycopg.connect(self.primary.url, autocommit=True) as connection:
             connection.execute(KEEP_LOG)
             connection.execute("SELECT pg_reload_conf()")
         others = [node for node in self.nodes if node is not self.primary]
         for node in others:
             self._copy_to(node)
-        # Only now, with all that a server needs to change its part: whoever waits for a standby must have one.
-        self.primary.stop()
-        for node in self.nodes:
-            node.options |= self._settings(node)
-        self.primary.start()
-        for node in others:
             node.start()
         self.wait_until_whole()
 
@@ -216,11 +213,11 @@ def _touch(path: Path, node: EmbeddedServer) -> None:
 
 
 @contextmanager
-def cluster(folder: Path, names: Sequence[str] = NODES) -> Iterator[Cluster]:
-    """Servers that run, and end with the block."""
+def cluster(folder: Path, whole: Path, names: Sequence[str] = NODES) -> Iterator[Cluster]:
+    """Servers that run, and end with the block. whole: of `tests.conftest.whole_cluster`."""
     made = Cluster(folder, names)
     try:
-        made.start()
+        made.start(whole)
         yield made
     finally:
         made.stop()

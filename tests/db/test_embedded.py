@@ -19,7 +19,7 @@ from app.db import binaries, embedded
 from app.db.binaries import BinariesError, binary
 from app.db.embedded import EmbeddedServer, EmbeddedServerError, _children
 from app.db.run_as import run_as
-from tests.conftest import short_folder
+from tests.conftest import copied, short_folder
 
 AS_ROOT = os.geteuid() == 0
 USE = """
@@ -41,25 +41,10 @@ def folder() -> Iterator[Path]:
         yield home
 
 
-@pytest.fixture(scope="module")
-def template(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A data folder whose server has run and ended."""
-    server = EmbeddedServer(tmp_path_factory.mktemp("embedded") / "data", {"fsync": "off"})
-    server.start()
-    server.stop()
-    return server.data_dir
-
-
 @pytest.fixture
-def data(folder: Path, template: Path) -> Path:
-    """A copy of it: to make a cluster takes longer than to start a server."""
-    return copied(template, folder / "data")
-
-
-def copied(template: Path, data: Path) -> Path:
-    embedded.make_data_dir(data)
-    subprocess.run(["cp", "-a", template / "postgres", data], check=True)
-    return data
+def data(folder: Path, whole_cluster: Path) -> Path:
+    """A data folder whose server has run and ended."""
+    return copied(whole_cluster, folder / "data")
 
 
 def start(data_dir: Path, *before: str) -> subprocess.Popen[str]:
@@ -305,8 +290,8 @@ def test_an_initdb_killed_half_way_is_begun_again(folder: Path) -> None:
 
 
 @pytest.mark.long
-def test_a_long_path_has_its_socket_elsewhere(folder: Path, template: Path) -> None:
-    server = EmbeddedServer(copied(template, folder / ("deep" * 20) / "data"))
+def test_a_long_path_has_its_socket_elsewhere(folder: Path, whole_cluster: Path) -> None:
+    server = EmbeddedServer(copied(whole_cluster, folder / ("deep" * 20) / "data"))
     with server as url:
         psycopg.connect(url).close()
         elsewhere = server._socket_dir()

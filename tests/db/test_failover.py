@@ -1,6 +1,7 @@
 """The server that is written to is killed, and a standby takes its place: what was answered is in the record, once."""
 
 from collections.abc import Iterator
+from pathlib import Path
 
 import psycopg
 import pytest
@@ -25,8 +26,8 @@ def _impatient() -> Iterator[None]:
 
 
 @pytest.fixture(scope="module")
-def three() -> Iterator[Cluster]:
-    with short_folder() as folder, cluster(folder) as made:
+def three(whole_cluster: Path) -> Iterator[Cluster]:
+    with short_folder() as folder, cluster(folder, whole_cluster) as made:
         yield made
 
 

@@ -2,6 +2,7 @@
 
 import re
 from collections.abc import Iterator
+from pathlib import Path
 
 import httpx
 import pytest
@@ -17,9 +18,9 @@ KEYS = ("north", "south")
 
 
 @pytest.fixture(scope="module")
-def servers() -> Iterator[Cluster]:
+def servers(whole_cluster: Path) -> Iterator[Cluster]:
     """One that is written to, and its standby."""
-    with short_folder() as folder, cluster(folder, ("one", "two")) as made:
+    with short_folder() as folder, cluster(folder, whole_cluster, ("one", "two")) as made:
         yield made
 
 

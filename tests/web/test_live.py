@@ -19,14 +19,13 @@ import pytest
 
 from app.access import actions as people
 from app.access.sign_in import sign_out
-from app.db import migrate
 from app.db.connections import Connections
 from app.db.embedded import EmbeddedServer
 from app.db.engine import Database
 from app.db.events import publish
 from app.loop.machines import keys
 from app.web.live import MOST_MISSED, Access, Live
-from tests.conftest import RunServer, Server, in_database
+from tests.conftest import RunServer, Server, copied, in_database
 from tests.loops import run
 from tests.shop import Shop, unique
 
@@ -436,9 +435,11 @@ def test_no_stream_calls_itself_live_in_an_outage_which_the_log_tells_once(shop:
 
 
 @pytest.mark.long
-def test_no_stream_calls_itself_live_while_the_whole_postgresql_is_away(run_server: RunServer, tmp_path: Path) -> None:
-    postgres = EmbeddedServer(tmp_path / "inband", {"fsync": "off"})
-    migrate.upgrade(postgres.start())
+def test_no_stream_calls_itself_live_while_the_whole_postgresql_is_away(
+    run_server: RunServer, whole_cluster: Path, tmp_path: Path
+) -> None:
+    postgres = EmbeddedServer(copied(whole_cluster, tmp_path / "inband"), {"fsync": "off"})
+    postgres.start()
     try:
         with run_server(postgres.url) as server:
             shop = Shop(server)

@@ -4,6 +4,7 @@ import re
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
+from pathlib import Path
 from typing import Any
 
 import httpx
@@ -25,9 +26,9 @@ BEHIND = "X-Inband-Behind"
 
 
 @pytest.fixture(scope="module")
-def servers() -> Iterator[Cluster]:
+def servers(whole_cluster: Path) -> Iterator[Cluster]:
     """One that is written to, and its standby."""
-    with short_folder() as folder, cluster(folder, ("one", "two")) as made:
+    with short_folder() as folder, cluster(folder, whole_cluster, ("one", "two")) as made:
         yield made
 
 

@@ -8,6 +8,7 @@ import threading
 import time
 from collections.abc import Callable, Iterator
 from concurrent.futures import Future, ThreadPoolExecutor
+from pathlib import Path
 from typing import Any
 
 import httpx
@@ -15,9 +16,8 @@ import psycopg
 import pytest
 
 from app.core.parameters import read
-from app.db import migrate
 from app.db.embedded import EmbeddedServer
-from tests.conftest import RunServer, Server
+from tests.conftest import RunServer, Server, copied
 from tests.db.clusters import commits_wait_for
 from tests.loop.readings.load import Sender, all_at_once, scattered
 from tests.loop.readings.record import history, must_be_stored, must_hold, must_replay, rows
@@ -232,10 +232,10 @@ def is_ready(server: Server) -> bool:
 
 
 @pytest.fixture(scope="module")
-def away(tmp_path_factory: pytest.TempPathFactory) -> Iterator[EmbeddedServer]:
+def away(whole_cluster: Path, tmp_path_factory: pytest.TempPathFactory) -> Iterator[EmbeddedServer]:
     """A database server of our own, which may be stopped."""
-    postgres = EmbeddedServer(tmp_path_factory.mktemp("away") / "inband", {"fsync": "off"})
-    migrate.upgrade(postgres.start())
+    postgres = EmbeddedServer(copied(whole_cluster, tmp_path_factory.mktemp("away") / "inband"), {"fsync": "off"})
+    postgres.start()
     yield postgres
     postgres.stop()
 
