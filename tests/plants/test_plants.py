@@ -1,6 +1,5 @@
 """Several plants in one installation: each with tables, people, keys and events of its own."""
 
-import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from functools import partial
@@ -25,17 +24,19 @@ from tests.conftest import TLS, NewDatabase, RunServer, Server, drop_database
 from tests.forked import inband
 from tests.pages.looks import violations
 from tests.shop import PARAMETERS
+from tests.waits import until
 
 PASSWORD = "correct horse battery"
 get = partial(httpx.get, timeout=60, verify=TLS)
 
 
 @pytest.fixture(scope="module")
-def server(run_server: RunServer) -> Iterator[Server]:
+def server(new_database: NewDatabase, run_server: RunServer) -> Iterator[Server]:
     """A server with a plant at its root, which was there before, and two more: `north` in Kolkata's time, `south`."""
-    with run_server() as running:
-        add(running, "north", timezone="Asia/Kolkata")
-        add(running, "south", timezone="Europe/Belgrade")
+    url = new_database()
+    add(url, "north", timezone="Asia/Kolkata")
+    add(url, "south", timezone="Europe/Belgrade")
+    with run_server(url) as running:
         for key in ("north", "south"):
             with in_plant(running, key) as session:
                 people.add_person(session, name="Mira", role="engineer", password=PASSWORD, actor="tests")
@@ -43,9 +44,9 @@ def server(run_server: RunServer) -> Iterator[Server]:
         yield running
 
 
-def add(server: Server, key: str, **options: Any) -> None:
+def add(url: str, key: str, **options: Any) -> None:
     usual = {"name": key.capitalize(), "schema": None, "host": None, "timezone": None, "shifts": None}
-    commands.add_plant(key, **usual | options, data_dir=None, database_url=server.database.dsn)
+    commands.add_plant(key, **usual | options, data_dir=None, database_url=url)
 
 
 @contextmanager
@@ -57,13 +58,6 @@ def in_plant(server: Server, key: str | None) -> Iterator[Session]:
             yield session
     finally:
         database.close()
-
-
-def until(there: Any, seconds: float = 60) -> None:
-    deadline = time.monotonic() + seconds
-    while not there():
-        assert time.monotonic() < deadline, "it did not come in time"
-        time.sleep(0.1)
 
 
 def client_of(server: Server, key: str | None) -> httpx.Client:
@@ -177,7 +171,7 @@ class TestAddresses:
 
     @pytest.mark.long
     def test_a_plant_may_have_a_host_name_and_keeps_its_schema_when_it_is_removed(self, server: Server) -> None:
-        add(server, "hosted", host="hosted.example")
+        add(server.database.dsn, "hosted", host="hosted.example")
         at_host = {"Host": "hosted.example:8443"}
         until(lambda: "hosted" in get(f"{server.url}/plants").text)
         until(lambda: get(f"{server.url}/health/ready", headers=at_host).status_code == 200)

@@ -10,8 +10,9 @@ import pytest
 from app.access import actions as people
 from tests.conftest import RunServer, Server, short_folder
 from tests.db.clusters import Cluster, cluster
-from tests.plants.test_plants import PASSWORD, add, client_of, get, in_plant, read, set_up, until
+from tests.plants.test_plants import PASSWORD, add, client_of, get, in_plant, read, set_up
 from tests.shop import PARAMETERS
+from tests.waits import until
 from tests.web.test_replica import BEHIND, paused
 
 KEYS = ("north", "south")
@@ -29,9 +30,10 @@ def server(servers: Cluster, run_server: RunServer) -> Iterator[Server]:
     """Two plants, beside the one at the root."""
     with pytest.MonkeyPatch.context() as environment:
         environment.setenv("INBAND_READ_DATABASE_URL", servers.nodes[1].url)
+        for key in KEYS:
+            add(servers.nodes[0].url, key)
         with run_server(servers.nodes[0].url) as running:
             for key in KEYS:
-                add(running, key)
                 with in_plant(running, key) as session:
                     people.add_person(session, name="Mira", role="engineer", password=PASSWORD, actor="tests")
                 until(lambda key=key: get(f"{running.url}/p/{key}/health/ready").status_code == 200)

@@ -282,7 +282,7 @@ class TestKilled:
 
     def test_the_process_that_makes_them_takes_nothing_else_along(self, bores: Shop, server: Server) -> None:
         with held_up(bores) as let_one_pass:
-            number = ask(bores, characteristics=keys(2))["id"]
+            number = ask(bores, characteristics=keys(2), sections=["numbers"])["id"]
             let_one_pass(number)
             (maker,) = makers(server)
             assert os.getpriority(os.PRIO_PROCESS, maker) >= NICE, "readings go first"
