@@ -2,10 +2,12 @@
 
 import json
 import random
+from collections.abc import Iterator
 from datetime import UTC, datetime, timedelta
 from typing import Any
 
 import pytest
+from anyio.from_thread import BlockingPortal, start_blocking_portal
 
 from app.loop.readings.door import Directory
 from app.loop.readings.schemas import decode_one
@@ -14,7 +16,6 @@ from app.loop.readings.writer.snapshot import Snapshot
 from app.loop.readings.writer.transaction import transact
 from tests.conftest import Server
 from tests.loop.readings.record import history, must_hold
-from tests.loops import run
 from tests.shop import Shop
 
 pytestmark = pytest.mark.own_server  # the whole record of its database is held against the rules
@@ -64,25 +65,38 @@ class Twin:
 
 
 class Forgetful(Twin):
-    """The twin whose readings are decided on what is loaded for each of them."""
+    """The twin whose readings are decided on what is loaded for each of them, over one connection."""
+
+    def __init__(self, server: Server, portal: BlockingPortal) -> None:
+        super().__init__(server)
+        self.portal = portal
+        self.directory = Directory(server.database)
+        self.pipeline = portal.call(connect, server.database)
+
+    def close(self) -> None:
+        """Close the connection."""
+        self.portal.call(self.pipeline.connection.close)
 
     def push(self, which: int, reading: dict[str, Any]) -> None:
-        database = self.shop.server.database
         name = self.names[which]
-        entry = Directory(database).look_up(name)
+        entry = self.directory.look_up(name)
         wanted = decode_one(json.dumps({"characteristic": name, **reading}).encode(), datetime.now(UTC))
+        self.portal.call(transact, self.pipeline, {}, Snapshot(), [(entry, wanted)])
 
-        async def push() -> None:
-            pipeline = await connect(database)
-            await transact(pipeline, {}, Snapshot(), [(entry, wanted)])
-            await pipeline.connection.close()
 
-        run(push())
+@pytest.fixture
+def forgetful(server: Server) -> Iterator[Forgetful]:
+    with start_blocking_portal() as portal:
+        made = Forgetful(server, portal)
+        yield made
+        made.close()
 
 
 @pytest.mark.parametrize("seed", [1, *(pytest.param(seed, marks=pytest.mark.long) for seed in (2, 3))])
-def test_readings_are_decided_from_memory_as_if_all_were_loaded(server: Server, seed: int) -> None:
-    twins = [Twin(server), Forgetful(server)]
+def test_readings_are_decided_from_memory_as_if_all_were_loaded(
+    server: Server, forgetful: Forgetful, seed: int
+) -> None:
+    twins = [Twin(server), forgetful]
     chance = random.Random(seed)
     clock = datetime.now(UTC) - timedelta(hours=3)
     last = 0
