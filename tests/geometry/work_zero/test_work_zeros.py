@@ -1,6 +1,5 @@
 """Work zeros by REST: found, kept, idempotent, compared, made readings of."""
 
-import time
 from concurrent.futures import ThreadPoolExecutor
 from math import radians, tan
 from typing import Any
@@ -13,12 +12,13 @@ from sqlalchemy.exc import DBAPIError
 from app.db.engine import Database
 from app.geometry.work_zero.tables import WorkZero
 from app.loop.readings.results_actions import push_results
+from app.settings import Settings
 from tests.conftest import Server
 from tests.geometry.work_zero.bench import POCKET, moved, post
 from tests.shop import Shop
 from tests.waits import until
 
-LOCKED = "SELECT 1 FROM pg_stat_activity WHERE wait_event_type = 'Lock' AND datname = current_database()"
+LOCKED = "SELECT pid FROM pg_stat_activity WHERE wait_event_type = 'Lock' AND datname = current_database()"
 
 
 class TestImplausible:
@@ -196,14 +196,15 @@ class TestReadings:
         shop = Shop(server)
         senders = [server.client(server.key()) for _ in range(48)]
         given = POCKET | {"machine": shop.machine}
+        settings = Settings(database_url=server.database.dsn)
+        overflow = settings.pool_size if settings.pool_overflow is None else settings.pool_overflow
         with psycopg.connect(server.database.dsn) as holding, ThreadPoolExecutor(len(senders)) as pool:
             for client in senders:
                 assert client.get("/api/v1/machines").status_code == 200  # its key is known from now on
             holding.execute("LOCK TABLE machine IN ACCESS EXCLUSIVE MODE")
             waiting = [pool.submit(client.post, "/api/v1/work-zeros", json=given) for client in senders]
             with psycopg.connect(server.database.dsn, autocommit=True) as looking:
-                until(lambda: looking.execute(LOCKED).fetchone() is not None)
-            time.sleep(2)  # so long that all of them are there
+                until(lambda: len(looking.execute(LOCKED).fetchall()) >= settings.pool_size + overflow)  # all are taken
             assert not any(each.done() for each in waiting)
             holding.rollback()
             assert {each.result().status_code for each in waiting} == {201}

@@ -2,7 +2,6 @@
 
 import re
 import signal
-import time
 from collections.abc import Callable
 from pathlib import Path
 
@@ -11,6 +10,7 @@ import pytest
 
 from tests.conftest import TLS, NewDatabase, Process, begun, drop_database, free_port, wait_ready
 from tests.forked import Forked
+from tests.waits import until
 
 
 def signed_in(port: int, log: Path) -> None:
@@ -20,19 +20,12 @@ def signed_in(port: int, log: Path) -> None:
     with httpx.Client(base_url=f"http://127.0.0.1:{port}", timeout=60, verify=TLS) as client:
         body = {"name": "engineer", "password": found[1]}
         assert client.post("/sign-in", data=body).is_redirect
-        deadline = time.monotonic() + 120
-        while time.monotonic() < deadline:
-            answer = client.get("/api/v1/readings", params={"characteristic": "plate-d30", "limit": 50})
-            bridged = client.get("/api/v1/readings", params={"characteristic": "spigot-d30"})
-            if (
-                answer.is_success
-                and len(answer.json()["items"]) == 50
-                and bridged.is_success
-                and bridged.json()["items"]
-            ):
-                return
-            time.sleep(0.2)
-    pytest.fail(log.read_text())
+
+        def readings(characteristic: str) -> int:
+            answer = client.get("/api/v1/readings", params={"characteristic": characteristic, "limit": 50})
+            return len(answer.json()["items"]) if answer.is_success else 0
+
+        until(lambda: readings("plate-d30") == 50 and readings("spigot-d30"), 120)
 
 
 @pytest.mark.parametrize("start", [Forked, pytest.param(begun, marks=pytest.mark.long)])
