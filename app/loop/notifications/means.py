@@ -51,11 +51,12 @@ class Unanswered(OSError):
 
 @dataclass(frozen=True, slots=True)
 class Message:
-    """A message as each means needs it. data: the JSON of webhooks."""
+    """A message as each means needs it. data: the JSON of webhooks; picture: a PNG in a mail."""
 
     subject: str
     text: str
     data: dict[str, Any] = field(default_factory=dict)
+    picture: bytes | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -139,6 +140,8 @@ def _by_mail(job: Job, settings: Settings) -> str:
     mail["Message-ID"] = f"<inband-{job.delivery}-{secrets.token_hex(8)}@{sender.partition('@')[2]}>"
     mail["Auto-Submitted"] = "auto-generated"
     mail.set_content(job.message.text)
+    if job.message.picture is not None:
+        mail.add_attachment(job.message.picture, "image", "png", filename="readings.png", disposition="inline")
     if settings.mail_security == "tls":
         server: smtplib.SMTP = smtplib.SMTP_SSL(host, int(port or 465), timeout=STEP, context=_tls())
     else:

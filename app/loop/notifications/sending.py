@@ -6,7 +6,9 @@ in it is sent again.
 
 from collections import defaultdict
 from collections.abc import Callable, Iterable, Mapping
+from dataclasses import replace
 from datetime import date, datetime, timedelta
+from functools import cache, partial
 from typing import Any
 
 from sqlalchemy import delete, func, or_, select, text, update
@@ -24,6 +26,7 @@ from app.loop.alarm_response.reaction_queries import Reactions, plans_in_force, 
 from app.loop.alarms.kinds import kind_named
 from app.loop.notifications import message
 from app.loop.notifications.means import Answer, Job, Message
+from app.loop.notifications.picture import of_last_readings
 from app.loop.notifications.schemas import HoursIn, Rule, week
 from app.loop.notifications.tables import Announced, Delivery, NotificationRoute, Receiver
 from app.loop.tables.alarms import Alarm
@@ -191,7 +194,8 @@ def _about_alarms(
     )  # many that fail keep nobody waiting who can be reached
     places = {each.id: (URGENCY.index(each.tone), each.id) for each in active}
     first = [notice._replace(alarms=tuple(sorted(notice.alarms, key=places.__getitem__))) for notice in found]
-    return [_alarm_job(session, rows[notice.receiver], notice, address) for notice in first[:MOST_AT_ONCE]]
+    picture = cache(partial(_picture, session))  # of many receivers, the same
+    return [_alarm_job(session, rows[notice.receiver], notice, address, picture) for notice in first[:MOST_AT_ONCE]]
 
 
 def _same_address(rows: Mapping[int, Receiver]) -> dict[int, set[int]]:
@@ -227,9 +231,17 @@ def _of_plans(session: Session) -> list[Route]:
     ]
 
 
-def _alarm_job(session: Session, row: Receiver, notice: Notice, address: str) -> Job:
+def _picture(session: Session, number: int) -> bytes | None:
+    return of_last_readings(session, alarm(session, number))
+
+
+def _alarm_job(
+    session: Session, row: Receiver, notice: Notice, address: str, picture: Callable[[int], bytes | None]
+) -> Job:
     listed: list[AlarmRow] = [alarm(session, number) for number in notice.alarms[: message.MOST_IN_WORDS]]
     made = message.of_alarms(listed, len(notice.alarms), notice.again, address)
+    if row.means == "mail":
+        made = replace(made, picture=picture(notice.alarms[0]))
     return _job(session, row, "alarms", made, alarms=notice.alarms)
 
 

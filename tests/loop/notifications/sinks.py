@@ -55,7 +55,7 @@ class Mails:
 
     def to(self, address: str) -> list[str]:
         """The subjects and texts of the mails to an address."""
-        return [f"{mail['Subject']}\n\n{mail.get_content()}" for mail in self.mails if mail["To"] == address]  # type: ignore[attr-defined]
+        return [f"{mail['Subject']}\n\n{mail.get_body().get_content()}" for mail in self.mails if mail["To"] == address]  # type: ignore[attr-defined]
 
 
 @contextmanager

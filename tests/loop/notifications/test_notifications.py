@@ -7,11 +7,13 @@ import sys
 from collections.abc import Iterator
 from datetime import UTC, datetime, timedelta
 from functools import partial
+from io import BytesIO
 from pathlib import Path
 from types import ModuleType
 from typing import Any
 
 import pytest
+from PIL import Image, ImageColor
 from sqlalchemy import select, text
 from sqlalchemy.orm import Session
 
@@ -21,6 +23,7 @@ from app.language.times import begin_of_shift, end_of_shift
 from app.loop.notifications import means, notifier, sending
 from app.loop.notifications.addresses import Refused, place_of
 from app.loop.notifications.means import Answer, Job, Message, deliver
+from app.loop.notifications.picture import OUT
 from app.loop.notifications.schemas import RouteIn
 from app.loop.notifications.tables import NotificationRoute, Receiver
 from app.settings import Settings
@@ -120,6 +123,20 @@ class TestMail:
         (done,) = until(lambda: deliveries(shop, anna, "delivered"))
         assert done["alarms"] == [alarm["id"]]
         assert done["answer"] == "The mail server has taken it."
+
+    def test_it_shows_the_last_readings(self, shop: Shop, mails: tuple[Mails, str]) -> None:
+        address = f"{unique('mia')}@example.com"
+        route(shop, (0, receiver(shop, address, "mail")))
+        shop.push([0.5, -2.0, 3.0, 6.0])
+        shop.read(12)
+        until(lambda: mails[0].to(address))
+        (mail,) = (each for each in mails[0].mails if each["To"] == address)
+        (attached,) = mail.iter_attachments()  # type: ignore[attr-defined]
+        assert (attached.get_content_type(), attached.get_filename()) == ("image/png", "readings.png")
+        with Image.open(BytesIO(attached.get_content())) as picture:
+            assert picture.size == (640, 220)
+            colours = {colour for _number, colour in picture.getcolors(100_000) or ()}
+        assert ImageColor.getrgb(OUT) in colours, "the part out of tolerance is marked"
 
     def test_it_is_repeated_until_somebody_acknowledges_it(self, shop: Shop, mails: tuple[Mails, str]) -> None:
         address = f"{unique('ben')}@example.com"
