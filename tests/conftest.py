@@ -321,13 +321,15 @@ def session(rolled_back_database: Database) -> Iterator[Session]:
 
 
 @contextmanager
-def short_folder() -> Iterator[Path]:
+def short_folder(*, in_memory: bool = False) -> Iterator[Path]:
     """A folder that nobody else may enter, with a path as short as that of a socket has to be.
+
+    in_memory: if there is room, for what waits for the disk again and again.
 
     A PostgreSQL that still runs in it is ended by its number. The folder is locked as pytest locks its own: see
     `tests.keeper.CLUSTER`.
     """
-    made = Path(mkdtemp(prefix="inband-test-"))
+    made = Path(mkdtemp(prefix="inband-test-", dir=keeper.in_memory() if in_memory else None))
     (made / ".lock").write_text(str(os.getpid()))
     try:
         yield made

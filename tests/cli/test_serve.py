@@ -26,7 +26,7 @@ from tests.forked import Forked, inband
 
 @pytest.fixture
 def data_dir() -> Iterator[Path]:
-    with short_folder() as home:
+    with short_folder(in_memory=True) as home:
         yield home / "data"
 
 
@@ -118,6 +118,7 @@ def test_a_request_that_the_end_does_not_wait_for_learns_so(run_server: RunServe
             answer = asking.result(60)
         assert (answer.status_code, answer.headers["Retry-After"]) == (503, "5")
         assert answer.json()["type"] == "urn:inband:problem:server-ending"
+        holding.rollback()
         assert server.process.wait(60) == 0
 
 

@@ -28,7 +28,7 @@ BEHIND = "X-Inband-Behind"
 @pytest.fixture(scope="module")
 def servers(whole_cluster: Path) -> Iterator[Cluster]:
     """One that is written to, and its standby."""
-    with short_folder() as folder, cluster(folder, whole_cluster, ("one", "two")) as made:
+    with short_folder(in_memory=True) as folder, cluster(folder, whole_cluster, ("one", "two")) as made:
         yield made
 
 
