@@ -18,7 +18,7 @@ def get_alarm_load(
 ) -> AlarmLoadOut:
     """Alarms by position and ten minutes, floods, stale and chattering ones, and the ten noisiest with what makes them.
 
-    Without a period the last 30 days. The limits are those of ANSI/ISA-18.2-2016, table 7 (IEC 62682).
+    Without a period the last 30 days, or since the first machine was added. The limits are those of ANSI/ISA-18.2-2016, table 7 (IEC 62682).
     """
     found = queries.alarm_load(session, period, datetime.now(UTC), settings.bridge_silent_after, machine)
     return AlarmLoadOut.of(found)

@@ -9,7 +9,7 @@ from collections.abc import Sequence
 from datetime import datetime, timedelta
 from typing import Any, NamedTuple
 
-from sqlalchemy import select, text
+from sqlalchemy import func, select, text
 from sqlalchemy.orm import Session
 
 from app.core.alarm_load import DAYS, STALE, TOP, Annunciation, Load, Noise, load, noisiest
@@ -24,6 +24,7 @@ from app.loop.tables.alarms import Alarm
 from app.loop.tables.characteristics import Characteristic
 from app.loop.tables.machines import Machine
 from app.quality.what_if import queries as what_if
+from app.web.fields import HISTORY_BEGINS
 
 MOST_ALARMS = MOST_MACHINES = 100_000
 MOST_DAYS = 400
@@ -123,7 +124,7 @@ class AlarmLoad(NamedTuple):
 def alarm_load(
     session: Session, period: Period, now: datetime, silent_after: float, machine: str | None = None
 ) -> AlarmLoad:
-    """The load in a period, of all machines or of one; the last 30 days where none is named. Raises `NotFound`, `Invalid`.
+    """The load in a period, of all machines or of one; the last 30 days, or all of a younger plant, where none is named. Raises `NotFound`, `Invalid`.
 
     silent_after: seconds after which a bridge counts as silent, as it is set.
     """
@@ -131,7 +132,7 @@ def alarm_load(
     end = min(period.end or now, now)
     if end.year < EARLIEST_YEAR:
         raise Invalid.at("to", _("must not lie before {year}").format(year=EARLIEST_YEAR))
-    start = period.start or _round(end - timedelta(days=DAYS))
+    start = period.start or max(_round(end - timedelta(days=DAYS)), _begin(session, chosen, end))
     if start >= end or end - start > timedelta(days=MOST_DAYS):
         raise Invalid.at("from", _("must lie before the end, and at most {n} days before it").format(n=MOST_DAYS))
     rows = _rows(session, Period(start, end), chosen)
@@ -154,6 +155,15 @@ def alarm_load(
         positions.insert(0, Position(None, load((row.raised_at for row in rows), start, end), len(stale)))
     top = _top(session, rows, known, now, silent_after)
     return AlarmLoad(Period(start, end), chosen, positions, top, stale, cut)
+
+
+def _begin(session: Session, machine: Machine | None, end: datetime) -> datetime:
+    """The first ten minutes of the plant, or of a machine: a rate is not thinned by the time before. Only before `end`."""
+    of = () if machine is None else (machine.id,)
+    made = select(func.min(Machine.created_at)).where(*(Machine.id == each for each in of)).scalar_subquery()
+    raised = select(func.min(Alarm.raised_at)).where(*(Alarm.machine_id == each for each in of)).scalar_subquery()
+    begin = session.scalar(select(func.least(made, raised)))
+    return HISTORY_BEGINS if begin is None or _round(begin) >= end else _round(begin)
 
 
 def _round(at: datetime) -> datetime:

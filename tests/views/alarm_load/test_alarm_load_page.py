@@ -70,6 +70,16 @@ def test_it_counts_by_position_and_names_what_makes_the_noise(ran: Shop) -> None
     assert len(found["stale"]) == 1
 
 
+def test_a_young_machine_is_counted_from_its_beginning(shop: Shop) -> None:
+    """One alarm in the first minutes is no quiet month."""
+    shop.read(350)
+    found = shop.call("GET", f"/alarm-load?machine={shop.machine}")
+    begin = datetime.fromisoformat(found["start"])
+    assert timedelta() <= datetime.now(UTC) - begin < timedelta(hours=2)
+    assert found["positions"][0]["per_ten_minutes"] > 0.05
+    assert not found["enough"]
+
+
 def test_a_time_before_all_machines_is_refused(shop: Shop) -> None:
     shop.call("GET", "/alarm-load?to=0001-01-05T00:00:00Z", 422)
 
