@@ -25,6 +25,11 @@ SUMMARIES = frozenset({
     "mean value", "average value", "max value", "min value", "maximum value", "minimum value", "maxwert", "minwert", "kleinstwert",
     "grosstwert", "grosster wert", "kleinster wert", "toleranzmitte", "x quer", "6s", "6σ", "σ", "otg", "utg", "moyenne", "ecart type", "etendue",
     "cote nominale", "media", "dev std", "promedio", "prosecna vrednost", "broj merenja", "total parts",
+    "srednia", "wartosc srednia", "odchylenie standardowe", "odch std", "rozstep", "mediana", "wartosc nominalna", "gorna granica",
+    "dolna granica", "prumer", "prumerna hodnota", "stredni hodnota", "aritmeticky prumer", "smerodatna odchylka", "rozpeti", "pocet",
+    "soucet", "jmenovita hodnota", "horni mez", "dolni mez", "priemer", "smerodajna odchylka", "atlag", "szoras", "terjedelem",
+    "srednja vrijednost", "deviazione standard", "desviacion estandar", "desvio padrao", "gemiddelde", "standaardafwijking",
+    "medelvarde", "standardavvikelse", "middelvaerdi", "gennemsnit", "ortalama", "medie", "keskiarvo",
 })  # fmt: skip
 """First cells of rows that hold limits or statistics, and no part. Folded."""
 

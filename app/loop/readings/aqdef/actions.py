@@ -174,17 +174,14 @@ def import_aqdef(
 def _refuse(chosen: Mapping[int, str], found: Mapping[int, Content]) -> None:
     if not chosen:
         against = [(each.line, each.title, each.obstacle or each.not_new) for each in found.values()]
-        raise Invalid(
-            _("None of the file's characteristics is chosen; say which is which."),
-            errors=[
-                FieldError("characteristics", _("none is chosen")),
-                *(
-                    FieldError(_("line {line}").format(line=line) if line else "file", f"{title}: {reason}")
-                    for line, title, reason in against[:20]
-                    if reason
-                ),
-            ],
-        )
+        reasons = [
+            FieldError(_("line {line}").format(line=line) if line else "file", f"{title}: {reason}")
+            for line, title, reason in against
+            if reason
+        ]
+        if reasons and len(reasons) == len(against):
+            raise Invalid(_("None of the file's characteristics can be imported."), errors=reasons[:20])
+        raise Invalid(_("None of the file's characteristics is chosen; say which is which."), errors=reasons[:20])
     keys = Counter(key for key in chosen.values() if key != NEW)
     for index, key in chosen.items():
         content = found.get(index)
@@ -230,7 +227,9 @@ def _store(
     current = characteristic_queries.characteristic_named(session, entry.characteristic)
     doubts = tuple(matching.doubts(content, current.parameters))
     if not readings.found.counted[content.index]:
-        return Result(content, entry.characteristic, created, Summary(), doubts=doubts)
+        return Result(
+            content, entry.characteristic, created, Summary(), doubts=(*doubts, _("the file has no size of it"))
+        )
     with session.begin_nested() as part:
         try:
             lines = readings.lines(content.index, entry.characteristic)

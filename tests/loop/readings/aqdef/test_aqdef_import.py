@@ -10,6 +10,7 @@ import pytest
 from playwright.sync_api import Page, expect
 from sqlalchemy import text
 
+from app.cli.base import explain
 from app.core.parameters import read
 from app.db.engine import Database
 from app.errors import Invalid
@@ -298,11 +299,26 @@ def test_where_nothing_is_chosen_it_is_said_why(plant: Database, tmp_path: Path)
     lines += ["K2001/3 M8", "K2110/3 20", "K2111/3 30", "K2142/3 Nm"]
     with pytest.raises(Invalid) as refusal:
         run(plant, written(tmp_path / "a.dfq", lines))
-    assert [(each.field, each.message) for each in refusal.value.errors][1:] == [
+    assert refusal.value.detail == "None of the file's characteristics can be imported."
+    assert [(each.field, each.message) for each in refusal.value.errors] == [
         ("line 2", "L1: it has no tolerance: K2111 is missing"),
         ("line 6", "W1: is not a length: its unit is '°' (K2142)"),
         ("line 11", "M8: is not a length: its unit is 'Nm' (K2142)"),
     ]
+
+
+def test_where_all_could_be_chosen_nothing_is_said_twice(plant: Database, tmp_path: Path) -> None:
+    lines = ["K0100 1", "K2001/1 L1", "K2101/1 40", "K2110/1 39.9", "K2111/1 40.1", "K2142/1 mm", "K0001/1 40"]
+    with pytest.raises(Invalid, match="is chosen; say which is which") as refusal:
+        run(plant, written(tmp_path / "a.dfq", lines))
+    assert explain(refusal.value)[0] == "None of the file's characteristics is chosen; say which is which."
+
+
+def test_a_characteristic_without_a_value_says_so(plant: Database, tmp_path: Path) -> None:
+    lines = ["K0100 2", "K2001/1 L1", "K2101/1 40", "K2110/1 39.9", "K2111/1 40.1", "K2142/1 mm"]
+    lines += ["K2001/2 L2", "K2101/2 40", "K2110/2 39.9", "K2111/2 40.1", "K2142/2 mm", "K0001/2 40"]
+    outcome = run(plant, written(tmp_path / "a.dfq", lines), {1: NEW, 2: NEW}, dry_run=True)
+    assert [each.doubts for each in outcome.results] == [("the file has no size of it",), ()]
 
 
 def test_without_a_tolerance_nothing_is_set_up() -> None:

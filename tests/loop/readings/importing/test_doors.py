@@ -162,7 +162,8 @@ TABLES = {
         bridge={"statistics": "skip"},
     ),
     "footer without times": Case(
-        "Part;D40\nP1;40,001\nP2;40,002\nDurchschnitt;40,0015\nMax value;40,002\n", bad=(4, 5)
+        "Part;D40\nP1;40,001\nP2;40,002\nDurchschnitt;40,0015\nMax value;40,002\nŚrednia;40,0015\nPrůměr;40,0015\n",
+        bad=(4, 5, 6, 7),
     ),
     "footer": Case(THREE + "\nMean;40,002\nCpk;1,45\n", bad=(6, 7)),
     "blanks": Case(
