@@ -9,6 +9,7 @@ from app.language.i18n import _, ngettext
 from app.language.numbers import as_read
 from app.loop.alarm_response import wording
 from app.loop.alarm_response.queries import AlarmRow
+from app.loop.alarm_response.reaction_queries import Reactions
 from app.loop.notifications.means import Message
 
 log = logging.getLogger(__name__)
@@ -17,8 +18,11 @@ MOST_IN_WORDS = 20
 """Alarms that a message describes; of more it says how many they are."""
 
 
-def of_alarms(rows: Sequence[AlarmRow], count: int, again: Collection[int], address: str) -> Message:
+def of_alarms(
+    rows: Sequence[AlarmRow], count: int, again: Collection[int], address: str, reactions: Reactions
+) -> Message:
     """A message about active alarms. rows: the most urgent `MOST_IN_WORDS` of `count`; again: those it reminds of."""
+    steps = {row.alarm.id: _steps(reactions, row) for row in rows}
     reminder = len(again) >= count
     if count == 1:
         subject = f"{wording.kind_word(rows[0].alarm.kind)}: {_where(rows[0])}"
@@ -27,7 +31,7 @@ def of_alarms(rows: Sequence[AlarmRow], count: int, again: Collection[int], addr
         subject = f"{subject}: {_which(rows, count)}"
     if reminder:
         subject = _("Reminder: {subject}").format(subject=subject)
-    parts = [_in_words(row, address) for row in rows]
+    parts = [_in_words(row, steps[row.alarm.id], address) for row in rows]
     if count > len(rows):
         parts.append(_("… and {n} more: {link}").format(n=count - len(rows), link=f"{address}/alarms"))
     parts.append(_("Acknowledge an alarm on its page; then nobody is reminded of it any more."))
@@ -36,7 +40,7 @@ def of_alarms(rows: Sequence[AlarmRow], count: int, again: Collection[int], addr
         "reminder": reminder,
         "subject": subject,
         "count": count,
-        "alarms": [_as_json(row, address) for row in rows],
+        "alarms": [_as_json(row, steps[row.alarm.id], address) for row in rows],
     }
     return Message(subject, "\n\n".join(parts) + "\n", data)
 
@@ -57,7 +61,13 @@ def _where(row: AlarmRow) -> str:
     return ", ".join(name for name in names if name)
 
 
-def _in_words(row: AlarmRow, address: str) -> str:
+def _steps(reactions: Reactions, row: AlarmRow) -> list[str]:
+    """The steps of its reaction plan."""
+    plan = reactions.plan_of(row)
+    return [] if plan is None else [step["text"] for step in plan.steps]
+
+
+def _in_words(row: AlarmRow, steps: Sequence[str], address: str) -> str:
     alarm = row.alarm
     times = ngettext("{n} time", "{n} times", alarm.count).format(n=alarm.count)
     lines = (
@@ -65,6 +75,7 @@ def _in_words(row: AlarmRow, address: str) -> str:
         f"{as_read(alarm.raised_at, 'minutes')}{f', {times}' if alarm.count > 1 else ''}",
         _sentence(row),
         wording.what_to_do(alarm.kind),
+        *(f"{number}. {step}" for number, step in enumerate(steps, 1)),
         _link(row, address),
     )
     return "\n".join(lines)
@@ -83,7 +94,7 @@ def _link(row: AlarmRow, address: str) -> str:
     return f"{address}/alarms/{row.alarm.id}"
 
 
-def _as_json(row: AlarmRow, address: str) -> dict[str, Any]:
+def _as_json(row: AlarmRow, steps: Sequence[str], address: str) -> dict[str, Any]:
     alarm = row.alarm
     return {
         "id": alarm.id,
@@ -98,6 +109,7 @@ def _as_json(row: AlarmRow, address: str) -> dict[str, Any]:
         "count": alarm.count,
         "text": _sentence(row),
         "what_to_do": wording.what_to_do(alarm.kind),
+        "steps": steps,
         "link": _link(row, address),
     }
 

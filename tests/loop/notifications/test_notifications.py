@@ -124,6 +124,16 @@ class TestMail:
         assert done["alarms"] == [alarm["id"]]
         assert done["answer"] == "The mail server has taken it."
 
+    def test_it_says_the_steps_of_the_reaction_plan(self, shop: Shop, mails: tuple[Mails, str]) -> None:
+        address = f"{unique('iva')}@example.com"
+        steps = [{"text": "Zaustavi mašinu „odmah“"}, {"text": "Pozovi <Đoku>"}]
+        plan: dict[str, Any] = {"characteristic": shop.characteristic, "steps": steps, "reason": "Prvi"}
+        shop.call("POST", "/reactions/plans", 201, name=unique("plan"), **plan)
+        route(shop, (0, receiver(shop, address, "mail")))
+        shop.read(20)
+        (mail,) = until(lambda: mails[0].to(address))
+        assert "\n1. Zaustavi mašinu „odmah“\n2. Pozovi <Đoku>\nhttps://" in mail.replace("\r", "")
+
     def test_it_shows_the_last_readings(self, shop: Shop, mails: tuple[Mails, str]) -> None:
         address = f"{unique('mia')}@example.com"
         route(shop, (0, receiver(shop, address, "mail")))
