@@ -92,6 +92,15 @@ def is_unsigned(column: str) -> bool:
     return column.strip().lower().replace(" ", "") in {"-tol", "tol-", "-tolerance"}
 
 
+def is_both_ways(column: str) -> bool:
+    """Tell of one column for both deviations, the same up and down: ±TOL.
+
+    >>> is_both_ways("±Tol"), is_both_ways("Tol. +/- [mm]"), is_both_ways("+TOL"), is_both_ways("Tol")
+    (True, True, False, False)
+    """
+    return "±" in column or "+/-" in column
+
+
 def guesses_of(header: tuple[str, ...]) -> dict[str, tuple[int, ...]]:
     """The fields that the names of columns mean."""
     names = [cell_values.folded(name) for name in header]
@@ -108,6 +117,9 @@ def guesses_of(header: tuple[str, ...]) -> dict[str, tuple[int, ...]]:
     unsigned = [at for at, name in enumerate(header) if is_unsigned(name)]
     if "lower" not in guesses and unsigned:
         guesses["lower"] = (unsigned[0],)
+    both = [at for at, name in enumerate(header) if is_both_ways(name)]
+    if both and not {"upper", "lower"} & guesses.keys():
+        guesses |= {"upper": (both[0],), "lower": (both[0],)}
     features = [at for at, each in enumerate(names) if each in FEATURES]
     if features and guesses.get("characteristic", (-1,))[0] not in features:
         guesses["characteristic"] = tuple(

@@ -9,7 +9,7 @@ from app.files.formats.column_names import LOWER_LIMITS, UPPER_LIMITS
 from app.files.formats.units import UnknownUnit, agreed, in_mm, unit_in, unit_of_name
 from app.language.i18n import _
 from app.loop.readings.aqdef.matching import Content, not_new
-from app.loop.readings.importing.columns import is_unsigned
+from app.loop.readings.importing.columns import is_both_ways, is_unsigned
 from app.loop.readings.importing.layout import Drawn, Layout
 
 _SIZES = frozenset(map(folded, (*UPPER_LIMITS, *LOWER_LIMITS)))
@@ -59,8 +59,10 @@ def _limits(name: str, drawn: Drawn, layout: Layout) -> tuple[float | None, floa
         words = _("lines {first} and {other} give it different limits, nominal sizes or units")
         raise _Wrong(words.format(first=drawn.line, other=drawn.other))
     nominal, lower, upper = (_length(name, drawn, layout, side) for side in ("nominal", "lower", "upper"))
-    if is_unsigned(layout.named("lower")) and lower is not None:
+    both = is_both_ways(layout.named("lower"))
+    if (both or is_unsigned(layout.named("lower"))) and lower is not None:
         lower = -abs(lower)
+        upper = -lower if both else upper
     sizes = []
     for side, value in (("lower", lower), ("upper", upper)):
         form_error = lower is None and not nominal  # its upper limit is both
@@ -82,7 +84,7 @@ def _limits(name: str, drawn: Drawn, layout: Layout) -> tuple[float | None, floa
 
 
 def _length(name: str, drawn: Drawn, layout: Layout, field: str) -> float | None:
-    text = getattr(drawn, field)
+    text = getattr(drawn, field).removeprefix("±").removeprefix("+/-")
     if not text:
         return None
     try:

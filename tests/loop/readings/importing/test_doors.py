@@ -635,6 +635,11 @@ def test_of_such_a_table_what_is_missing_is_set_up_with_its_limits(plant: Plant,
             "lines 2 and 3 give it different limits",
         ),
         ("Feature;Meas;Nominal;USL;LSL", "A;16;16;about;15.9", "'about' is not a number"),
+        ("Feature;Meas;Nominal;±Tol", "A;16.001;16;0.010", (16.0, 15.99, 16.01)),
+        ("Feature;Meas;Nominal;Tol. +/- [µm]", "A;16.001;16;±10", (16.0, 15.99, 16.01)),
+        ("Feature;Meas;Nominal;+/-", "A;0.001;0;-0.005", (0.0, -0.005, 0.005)),
+        ("Feature;Meas;±Tol", "A;16.001;0.010", "from a nominal size, which is missing"),
+        ("Feature;Meas;Nominal;Tol", "A;16.001;16;0.010", "the upper limit is missing"),
     ],
 )
 def test_the_limits_of_a_row(tmp_path: Path, head: str, row: str, found: tuple[float | None, ...] | str) -> None:
