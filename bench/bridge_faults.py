@@ -1,6 +1,7 @@
 """A bridge whose every part is killed or cut at random points: every reading exactly once, every correction exactly once.
 
-A simulated control makes parts, a bridge (a process of its own) brings them to a server (another process). Meanwhile the
+A simulated control makes parts: six tools, two of them with two characteristics, one with a sister that goes on half way, one without
+a location. A bridge (a process of its own) brings them to a server (another process). Meanwhile the
 bridge is killed, the server is killed, the broker is killed, the links are cut, the power of the control fails, its network goes,
 and an operator edits the offset by hand. At the end what the control has written is compared with what the server holds.
 ``python -m bench.bridge_faults [--faults 30] [--kind haas] [--seed 1]`` goes through all kinds if none is named; the long run is
@@ -31,15 +32,21 @@ import httpx
 
 from app.core.ring import SLOTS, Register
 from app.simulators.controls import simulator_named
-from app.simulators.controls.model import TOLERANCE, Feature, Model
+from app.simulators.controls.model import OWNERS, SISTERS, TOLERANCE, UNMAPPED, Feature, Model, six_tools
 from app.simulators.controls.mqtt import start_broker
 from app.simulators.controls.toml_text import toml_of
+from bench.outcome import HEAD, Outcome, Play, Process, shown
 from bench.plant import PARAMETERS, free_port, plant, wait_until_ready
 
-TOOL = 3
+EDITED = (1, 2, 3, 5)  # tools whose offsets an operator edits
+WORN = 4
+BIAS = 0.001  # mm
 SETTLE = 240.0  # s that everything may take to come to rest afterwards
 CYCLE = 0.15  # s between two parts
-UNHEARD = SLOTS - 2  # readings that are printed while nobody listens
+MAIL_WAIT = 0.2  # s that the NC program waits for the next correction after each that it has taken
+UNHEARD = SLOTS - len(
+    OWNERS
+)  # readings that nobody has heard when a part begins: the program prints the last eight again
 NOTICED = 90.0  # s within which an edit by hand is noticed
 OPEN = {"held", "awaiting_approval", "pending"}  # states of a correction that another one may follow
 
@@ -65,7 +72,7 @@ KINDS = {
     "folder": Kind(corrections=False),
     "haas": Kind({"register": "wear_diameter", "parameter": 2600}),
     "heidenhain": Kind({"register": "QR31", "parameter": 31, "holds": "radius"}, decimals=4, waits=False),
-    "mqtt": Kind(ordered=False),
+    "mqtt": Kind(ordered=False, waits=False),
     "opcua": Kind({"register": "wear_length_1", "parameter": 12}),
 }
 OUT = 0.008  # mm: the tolerance
@@ -156,11 +163,12 @@ class Control:
     to_server: Proxy = field(init=False)
     to_control: Proxy = field(init=False)
     making: bool = True
+    cutting: bool = True
 
     def __post_init__(self) -> None:
         self.kind = KINDS[self.name]
-        self.feature = Feature(nominal=39.992, tool=TOOL, bias=0.001, wear=0.0006, noise=0.0003, **self.kind.feature)
-        self.model = Model((self.feature,), seed=self.seed)
+        first = Feature(nominal=39.992, bias=BIAS, wear=0.0006, noise=0.0003, **self.kind.feature)
+        self.model = Model(six_tools(first), seed=self.seed, mail_wait=MAIL_WAIT)
         self.files, self.share = self.folder / "files", self.folder / "share"
 
     @contextmanager
@@ -197,6 +205,8 @@ class Control:
         self.simulator = await simulator_named(self.name).serve(self.model, 0, *place, **more)
         if self.name == "mqtt":
             self.simulator.broker = broker
+        if self.name == "folder":
+            self.simulator.pause = 0.1  # a file a reading: there are eight times as many
         self.to_control, self.to_server = Proxy(self.simulator.port), Proxy(self.server_port)
         await self.to_control.start()
         await self.to_server.start()
@@ -223,7 +233,8 @@ class Control:
                 while not self.kind.waits and len(self.model.written) - self._stored() > UNHEARD:
                     await self.print_again()
                     await asyncio.sleep(0.5)
-                self._program = self.model.part() if self.making else iter(())
+                self.cutting = self.making
+                self._program = self.model.part() if self.cutting else iter(())
             full = self.model.registers[Register.WRITTEN] - self.model.registers[Register.ACK] >= SLOTS
             await asyncio.sleep(0.02 if full else 0.001)
 
@@ -262,10 +273,12 @@ class Control:
         await asyncio.sleep(seconds)
         self.simulator.broker = await start_broker(self.files, self.broker_port)
 
-    async def edit(self, change: float) -> float:
-        place = (self.feature.tool, self.feature.edge, self.feature.register)
+    async def edit(self, tool: int, change: float) -> None:
+        [place] = {(each.tool, each.edge, each.register) for each in self.model.places if each.tool == tool}
         self.model.edit(place, round(self.model.offsets[place] + change, 4))
-        return self.model.offsets[place]
+
+    async def go_on_with_sister(self) -> None:
+        self.model.worn.add(WORN)
 
     async def print_again(self) -> None:
         """The program that prints the last eight again, where there is one."""
@@ -273,16 +286,23 @@ class Control:
             self.simulator.print_again()
 
     @property
-    def offset(self) -> float:
-        """The offset as the server has it: of a diameter."""
-        [held] = self.model.offsets.values()
-        return held * (2.0 if self.feature.holds == "radius" else 1.0)
+    def scale(self) -> float:
+        """What a step of an offset is in diameter, as the server has it."""
+        return 2.0 if self.model.features[0].holds == "radius" else 1.0
 
-    def truth(self) -> dict[str, float]:
-        """Name and size of each reading that was written completely; the files of a folder name the part only."""
+    @property
+    def offsets(self) -> dict[int, float]:
+        """The offset of each tool that is corrected, as the server has it."""
+        places = {each.tool: (each.tool, each.edge, each.register) for each in self.model.places}
+        used = {tool: place for tool, place in places.items() if tool not in SISTERS.values() or self.model.worn}
+        return {tool: self.scale * self.model.offsets[place] for tool, place in used.items()}
+
+    def truth(self, number: int) -> dict[str, float]:
+        """Name and size of each reading of a characteristic that was written completely; the files of a folder name the part only."""
+        slots = [(epoch, slot) for epoch, slot in self.model.written if slot.characteristic == number]
         if self.name == "folder":
-            return {f"P{slot.part}": slot.measured for _, slot in self.model.written}
-        return self.model.truth()
+            return {f"P{slot.part}": slot.measured for _, slot in slots}
+        return {f"{epoch}:{slot.sequence}": slot.measured for epoch, slot in slots}
 
     def named(self, reading: dict[str, Any]) -> str:
         """The name of a reading of the server, as in the truth."""
@@ -311,7 +331,7 @@ class Bridge:
 class Campaign:
     """One run. server: to be killed; call: the REST API as an administrator, ``(method, path, **json) -> JSON``.
 
-    name: of machine and characteristic, together with the kind. pause: s at most between two faults.
+    name: of the machine, together with the kind. pause: s at most between two faults. outcome: of its parts, afterwards.
     """
 
     server: Restartable
@@ -324,7 +344,9 @@ class Campaign:
     faults: dict[str, int] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        self.machine = self.characteristic = f"{self.name}-{self.kind}"
+        self.machine = f"{self.name}-{self.kind}"
+        self.keys = {number: f"{self.machine}-{number}" for number in range(1, len(OWNERS) + 1)}
+        self.parts, self.outcome = 0, Outcome(frozenset(), 0.0, 0, 0, 0.0)
         self.chance = random.Random(f"{self.seed} {self.kind}")
 
     def run(self, count: int) -> dict[str, int]:
@@ -350,9 +372,11 @@ class Campaign:
             bridge = Bridge(self._configuration(control, secret))
             bridge.start()
             try:
-                self._until(lambda: len(self._readings()) >= 3, "the first readings", SETTLE)
+                self._until(lambda: len(self._readings(1)) >= 3, "the first readings", SETTLE)
                 for number, fault in enumerate(faults, 1):
                     self._cause(fault, control, bridge)
+                    if number == (len(faults) + 1) // 2 and control.kind.corrections:
+                        self._go_on_with_sister(control)
                     time.sleep(self.chance.uniform(0.05, self.pause))
                     self._acknowledge()
                     if sys.stderr.isatty() or number % 25 == 0:
@@ -385,21 +409,27 @@ class Campaign:
             case _:
                 self._edit(control)
 
+    def _go_on_with_sister(self, control: Control) -> None:
+        tool = f"/machines/{self.machine}/tools/{WORN}"
+        self.call("PATCH", tool, sister=SISTERS[WORN])
+        self.call("POST", f"{tool}/switch", reason="faults")
+        control.do(control.go_on_with_sister())
+
     def _edit(self, control: Control) -> None:
-        """An operator changes the offset, and says at the alarm that it is true."""
-        control.do(control.edit(self.chance.choice([-0.004, 0.003, 0.005])))
-        held = control.offset
+        """An operator changes the offset of a tool, and says at the alarm that it is true."""
+        tool = self.chance.choice(EDITED)
+        control.do(control.edit(tool, self.chance.choice([-0.004, 0.003, 0.005])))
+        held = control.offsets[tool]
 
         def noticed() -> bool:
             self._acknowledge()
-            tool = self.call("GET", f"/machines/{self.machine}/tools/{TOOL}")
-            return bool(abs(tool["offset"] - control.offset) < TOLERANCE or control.offset != held)
+            return abs(self._told(tool) - control.offsets[tool]) < TOLERANCE or control.offsets[tool] != held
 
         try:
-            self._until(noticed, f"the edit to {held} is noticed", NOTICED)
+            self._until(noticed, f"the edit of tool {tool} to {held} is noticed", NOTICED)
         except AssertionError as error:
             error.add_note(
-                f"The control holds {control.offset}. The server: {self._known()}. The bridge: {self._noted()}"
+                f"The control holds {control.offsets[tool]}. The server: {self._known(tool)}. The bridge: {self._noted()}"
             )
             raise
 
@@ -410,10 +440,10 @@ class Campaign:
             intents = store.execute("SELECT number, state FROM intent WHERE state IN ('open', 'answered')").fetchall()
         return f"held and told {places}, under way {intents}"
 
-    def _known(self) -> str:
-        """What the server says of the tool, and what asks for a person."""
+    def _known(self, number: int) -> str:
+        """What the server says of a tool, and what asks for a person."""
         try:
-            tool = self.call("GET", f"/machines/{self.machine}/tools/{TOOL}")
+            tool = self.call("GET", f"/machines/{self.machine}/tools/{number}")
             alarms = self.call("GET", f"/alarms?state=active&machine={self.machine}")["items"]
         except httpx.HTTPError as error:
             return repr(error)
@@ -435,15 +465,9 @@ class Campaign:
 
     def _set_up(self) -> str:
         self.call("POST", "/machines", key=self.machine, name=self.machine, control="other")
-        parameters = PARAMETERS | {"tool_memory": TOOL, "average_memory": 5}
-        self.call(
-            "POST",
-            "/characteristics",
-            key=self.characteristic,
-            name="Shaft",
-            machine=self.machine,
-            parameters=parameters,
-        )
+        for (number, key), tool in zip(self.keys.items(), OWNERS, strict=True):
+            parameters = PARAMETERS | {"tool_memory": tool, "average_memory": number}
+            self.call("POST", "/characteristics", key=key, name=key, machine=self.machine, parameters=parameters)
         return str(self.call("POST", f"/machines/{self.machine}/keys", name="bridge")["secret"])
 
     def _configuration(self, control: Control, secret: str) -> Path:
@@ -455,7 +479,7 @@ class Campaign:
             table.pop(name, None)
         table |= {
             "secret": secret,
-            "characteristics": dict.fromkeys(table["characteristics"], self.characteristic),
+            "characteristics": dict(zip(table["characteristics"], self.keys.values(), strict=True)),
             "interval": 0.05,
             "offsets_every": 1.0,
             "patience": 5.0,
@@ -488,8 +512,8 @@ class Campaign:
             after = page["next"]
         return found
 
-    def _readings(self) -> list[dict[str, Any]]:
-        return self._all(f"/readings?characteristic={self.characteristic}&order=oldest&")
+    def _readings(self, number: int) -> list[dict[str, Any]]:
+        return self._all(f"/readings?characteristic={self.keys[number]}&order=oldest&")
 
     def _corrections(self) -> dict[int, dict[str, Any]]:
         return {each["number"]: each for each in self._all(f"/machines/{self.machine}/corrections?")}
@@ -504,14 +528,24 @@ class Campaign:
 
         self._until(tried, "a first correction is applied", SETTLE)
         control.making = False
+        self._until(lambda: not control.cutting, "the last part is measured", SETTLE)
 
         def at_rest() -> bool:
             control.do(control.print_again())
-            stored = len(self._readings())
-            return stored >= len(model.written) and model.registers[Register.ACK] == model.registers[Register.WRITTEN]
+            return model.registers[Register.ACK] == model.registers[Register.WRITTEN] and all(
+                len(self._readings(number)) >= len(control.truth(number)) for number in self.keys
+            )
 
         self._until(at_rest, f"all {len(model.written)} readings at the server", SETTLE)
-        readings, truth = self._readings(), control.truth()
+        for number in self.keys:
+            self._compare_readings(control, number)
+        if control.kind.corrections:
+            self._compare_corrections(control)
+        self.parts, self.outcome = model.parts, self._outcome(control)
+        return {"readings": len(model.written), "corrections": len(model.applied), **self.faults}
+
+    def _compare_readings(self, control: Control, number: int) -> None:
+        readings, truth = self._readings(number), control.truth(number)
         found = [control.named(reading) for reading in readings]
         assert sorted(found) == sorted(truth), _difference(found, list(truth))
         assert found == list(truth) or not control.kind.ordered, "they are in another order"
@@ -519,33 +553,36 @@ class Campaign:
         for name, reading in zip(found, readings, strict=True):
             assert abs(reading["measured"] - truth[name]) < least, f"{name} was {truth[name]}, is {reading['measured']}"
         assert [reading["sequence"] for reading in readings] == list(range(1, len(readings) + 1)), "numbers have gaps"
-        if control.kind.corrections:
-            self._compare_corrections(control)
-        return {"readings": len(readings), "corrections": len(model.applied), **self._outcome(control), **self.faults}
 
-    def _outcome(self, control: Control) -> dict[str, int]:
-        """Figures of the parts, as `bench.outcome` prints them; edits by hand, and parts cut while all was cut off, are among them."""
-        deviations = [abs(slot.measured - control.feature.nominal) for _, slot in control.model.written]
-        figures = {
-            "parts out of tolerance": sum(each > OUT for each in deviations),
-            "largest deviation, µm": round(1000 * max(deviations)),
+    def _outcome(self, control: Control) -> Outcome:
+        """As `bench.outcome` has it; edits by hand, and parts cut while all was cut off, are among them."""
+        sizes = {
+            (slot.characteristic, slot.part): slot.measured - control.model.features[0].nominal
+            for _, slot in control.model.written
+            if OWNERS[slot.characteristic - 1] != UNMAPPED
         }
-        if not control.kind.corrections:
-            return figures
-        issued = list(self._corrections().values())
+        issued = [each for each in self._corrections().values() if each["tool_memory"] != UNMAPPED]
         applied = [each for each in issued if each["status"] == "applied"]
         ages = [
             datetime.fromisoformat(each["applied_at"]) - datetime.fromisoformat(each["created_at"]) for each in applied
         ]
-        oldest = max((age.total_seconds() for age in ages), default=0.0)
-        return figures | {
-            "corrections issued": len(issued),
-            "corrections applied": len(applied),
-            "worst age, s": round(oldest),
-        }
+        return Outcome(
+            frozenset(at for at, size in sizes.items() if abs(size) > OUT),
+            max(map(abs, sizes.values())),
+            len(issued),
+            len(applied),
+            max((age.total_seconds() for age in ages), default=0.0),
+        )
+
+    def ideal(self) -> Outcome:
+        """The same wear and scatter, corrected at once: as many parts of another machine."""
+        play = Play(self.call, f"{self.machine}-ideal", self.kind, self.parts)
+        play.process, play.eventful = Process(play.process.features, start=BIAS), False
+        play.set_up()
+        return play.at_once()
 
     def _compare_corrections(self, control: Control) -> None:
-        model, scale = control.model, 2.0 if control.feature.holds == "radius" else 1.0
+        model, scale = control.model, control.scale
         numbers = [each.number for each in model.applied]
 
         def settled() -> bool:
@@ -564,7 +601,12 @@ class Campaign:
                 f"correction {number} was {wanted}, the offset went by {step}"
             )
         _no_edit_overwritten(model)
-        self._until(lambda: abs(self._told() - control.offset) < TOLERANCE, f"the offset {control.offset} is told", 30)
+        offsets = control.offsets
+        self._until(
+            lambda: all(abs(self._told(tool) - offset) < TOLERANCE for tool, offset in offsets.items()),
+            f"the offsets {offsets} are told",
+            30,
+        )
 
     def _merged(self) -> dict[int, list[int]]:
         """By number of an order: the earlier corrections that it took along."""
@@ -572,8 +614,8 @@ class Campaign:
             rows = store.execute("SELECT number, merged FROM intent WHERE machine = ?", (self.machine,)).fetchall()
         return {number: json.loads(merged) for number, merged in rows}
 
-    def _told(self) -> float:
-        return float(self.call("GET", f"/machines/{self.machine}/tools/{TOOL}")["offset"])
+    def _told(self, tool: int) -> float:
+        return float(self.call("GET", f"/machines/{self.machine}/tools/{tool}")["offset"])
 
 
 def _difference(found: list[str], written: list[str]) -> str:
@@ -584,13 +626,13 @@ def _difference(found: list[str], written: list[str]) -> str:
 
 
 def _no_edit_overwritten(model: Model) -> None:
-    """The offset is the sum of edits and corrections, each correction made on what stood there before."""
-    held = 0.0
-    for before, after in model.history:
-        assert abs(before - held) < 1e-9, f"an offset of {held} was overwritten as if it were {before}"
-        held = after
-    [offset] = model.offsets.values()
-    assert abs(offset - held) < 1e-9, f"the offset is {offset}, edits and corrections lead to {held}"
+    """Each offset is the sum of edits and corrections, each correction made on what stood there before."""
+    held = dict.fromkeys(model.offsets, 0.0)
+    for place, before, after in model.history:
+        assert abs(before - held[place]) < 1e-9, f"{held[place]} at {place} was overwritten as if it were {before}"
+        held[place] = after
+    for place, offset in model.offsets.items():
+        assert abs(offset - held[place]) < 1e-9, f"{place} is {offset}, edits and corrections lead to {held[place]}"
 
 
 def main() -> None:
@@ -633,7 +675,8 @@ def main() -> None:
             own.mkdir()
             began = time.monotonic()
             try:
-                found = Campaign(Server(), call, own, kind, chosen.seed).run(count)
+                campaign = Campaign(Server(), call, own, kind, chosen.seed)
+                found = campaign.run(count)
             except AssertionError as error:
                 lost.append(kind)
                 print("\n".join([f"\n{kind}: {error}", *getattr(error, "__notes__", ())]), flush=True)
@@ -643,6 +686,8 @@ def main() -> None:
             )
             for name, number in found.items():
                 print(f"{number:8d}  {name}", flush=True)
+            best = campaign.ideal()
+            print("\n".join([HEAD, shown("at once", best, best), shown(kind, campaign.outcome, best)]), flush=True)
     if lost:
         raise SystemExit(f"Failed: {', '.join(lost)}.")
 

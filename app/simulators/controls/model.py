@@ -93,8 +93,8 @@ class Applied(NamedTuple):
 
 @dataclass(slots=True)
 class Model:
-    """A machine. seed: None for another noise, and another epoch, each time. history: every change of an offset, before and after,
-    by the NC program or by hand. mail_wait: s that the NC program waits for the next correction after each that it has taken;
+    """A machine. seed: None for another noise, and another epoch, each time. history: every change of an offset,
+    which, before and after, by the NC program or by hand. mail_wait: s that the NC program waits for the next correction after each that it has taken;
     decision_wait: s that it waits for the decision on each reading; told: holds and stops that it has acted upon; idle:
     it waits. worn: tools whose sister cuts in their place.
     """
@@ -119,7 +119,7 @@ class Model:
     written: list[tuple[int, Slot]] = field(default_factory=list)
     applied: list[Applied] = field(default_factory=list)
     refused: list[tuple[int, Answer]] = field(default_factory=list)
-    history: list[tuple[float, float]] = field(default_factory=list)
+    history: list[tuple[tuple[int, int, str], float, float]] = field(default_factory=list)
     chance: random.Random = field(init=False)
 
     def __post_init__(self) -> None:
@@ -267,7 +267,7 @@ class Model:
         if abs(held - mail.value) > tolerance or not self._has_applied(mail.number):
             self.offsets[place] = mail.value
             self.applied.append(Applied(mail.number, held, mail.value))
-            self.history.append((held, mail.value))
+            self.history.append((place, held, mail.value))
             yield
         self.registers[Register.APPLIED] = float(mail.number)
         yield
@@ -311,7 +311,7 @@ class Model:
 
     def edit(self, place: tuple[int, int, str], offset: float) -> None:
         """Set an offset by hand at the panel."""
-        self.history.append((self.offsets[place], offset))
+        self.history.append((place, self.offsets[place], offset))
         self.offsets[place] = offset
 
     def power_loss(self, *, battery: bool = True) -> None:

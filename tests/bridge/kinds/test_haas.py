@@ -193,7 +193,7 @@ def test_a_correction_gets_into_the_offset_once_beside_a_collector(tmp_path: Pat
             assert intent.outcome.applied
             assert intent.outcome.offset == pytest.approx(-0.0125)
             assert model.offsets[PLACE] == pytest.approx(-0.0125)
-            assert [offset for _, offset in model.history] == [-0.0125]
+            assert [offset for *_, offset in model.history] == [-0.0125]
             assert [each.number for each in model.applied] == ([1] if mode == "control" else [])
             in_effect = [row.body["correction_in_effect"] for row in await store.waiting("lathe-1")]
             assert in_effect[0] == 0
