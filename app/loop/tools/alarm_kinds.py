@@ -3,11 +3,11 @@
 from datetime import datetime
 
 from app.language.i18n import _, ngettext
-from app.language.numbers import PLUS_MINUS, as_read, fixed, mm, signed, um, um_limit
+from app.language.numbers import PLUS_MINUS, age, as_read, fixed, mm, signed, um, um_limit
 from app.loop.alarms.kinds import AlarmKind, register
 from app.loop.alarms.reading_kinds import moved_by
 from app.loop.tables.alarms import Alarm
-from app.loop.tables.tools import OPPOSITE
+from app.loop.tables.tools import EARLY, OPPOSITE
 
 
 def _differs(alarm: Alarm) -> str:
@@ -80,6 +80,49 @@ OPPOSITE_EFFECT = register(
                 _("Offset register corrected"),
                 _("Another tool cuts it"),
                 _("Edge chipped, replaced later"),
+            ]
+        },
+    )
+)
+
+
+def _early(alarm: Alarm) -> str:
+    data = alarm.data
+    than = {
+        "machined_at": _("machined_at says ({lag} before the reading came in): the clock of the machine is behind"),
+        "correction_in_effect": _("correction_in_effect says: the number sent is not that of the last one applied"),
+    }.get(str(data.get("by")), _("they are confirmed: what is applied is reported late, or never"))
+    return _(
+        "Corrections of tool {tool} act earlier than {than}. {share} {pm} {error} of what counted as outstanding was in the sizes of "
+        "{characteristic} already; {n} parts were on the way. Nothing is corrected through tool {tool} until this alarm is answered."
+    ).format(
+        tool=alarm.tool_memory,
+        than=than.format(lag=age(data.get("lag") or 0.0)),
+        share=signed(data.get("share"), 2),
+        pm=PLUS_MINUS,
+        error=fixed(data.get("error"), 2),
+        characteristic=data.get("characteristic"),
+        n=data.get("after"),
+    )
+
+
+EARLY_EFFECT = register(
+    AlarmKind(
+        EARLY,
+        concerns_parts=True,
+        word=lambda: _("Early effect"),
+        sentence=_early,
+        what_to_do=lambda: _(
+            "Set the clock of the machine, or send correction_in_effect in place of machined_at; confirm each correction before the "
+            "next part is cut. Then answer the alarm: what was before it no longer counts."
+        ),
+        tone="stop",
+        icon="waiting",
+        comments={
+            "noted": lambda: [
+                _("Clock set"),
+                _("Sends the number of the last correction"),
+                _("Confirms before the next part"),
             ]
         },
     )
@@ -232,7 +275,11 @@ CHARACTERISTICS_DISAGREE = register(
         },
     )
 )
-PAUSING = (OFFSET_DIFFERS.name, OPPOSITE_EFFECT.name)  # nothing is corrected through the tool until they are answered
+PAUSING = (
+    OFFSET_DIFFERS.name,
+    OPPOSITE_EFFECT.name,
+    EARLY_EFFECT.name,
+)  # nothing is corrected through the tool until they are answered
 TOOL_LIFE = register(
     AlarmKind(
         "tool_life",

@@ -26,6 +26,7 @@ def made_by(kind: str) -> str:
         "offset_limit": _("largest sum of corrections"),
         "offset_differs": _("offset that the control reports"),
         "opposite_effect": _("factor, or the offset register"),
+        "early_effect": _("machined_at, correction_in_effect, or the confirmation"),
         "unusual_gain": _("factor"),
         "characteristics_disagree": _("targets and empirical values of two characteristics"),
         "corrections_not_taken": _("INBAND_CORRECTIONS_TAKEN_WITHIN"),

@@ -64,6 +64,10 @@ DATA: dict[str, list[dict[str, Any]]] = {
     "offset_limit": [_SIZE],
     "implausible": [_SIZE],
     "opposite_effect": [_GAIN | {"corrections": [_STEP, _STEP]}],
+    "early_effect": [
+        {"characteristic": "seat", "share": 0.98, "error": 0.09, "after": 1, "lag": 7200.0, "by": by}
+        for by in ("machined_at", "correction_in_effect", "confirmation")
+    ],
     "offset_differs": [{"reported": -0.0142, "expected": -0.0061}, {"correction": 9, "reported": 1.0, "expected": 0.9}],
     "corrections_not_taken": [
         {"waiting": 1, "first": 12, "since": _AT},

@@ -16,6 +16,7 @@ from app.core.decision.decide import Decision, outstanding_effect
 from app.core.decision.limits import ZONES
 from app.core.decision.loops import SERIES, Quiet, Series, quiet_run, rows_of
 from app.core.decision.step import CODES, Action
+from app.core.early import acts_early
 from app.core.gain import LONGEST, judge
 from app.errors import InbandError
 from app.loop.readings.records import Entry, Record
@@ -47,6 +48,7 @@ def compile_now() -> None:
     quiet_run(0, np.zeros(0), none, rows_of([]), none, np.zeros(0), Quiet.room(0))
     table([fixed(none, ">i8")], 0)
     judge(np.zeros(3), np.zeros(3), 1.0, 0, 1.0, 1.0)
+    acts_early(np.zeros(3), np.zeros(3), np.zeros(3), 1.0, 0, 1.0)
 
 
 class _Group:
@@ -181,7 +183,8 @@ class ColumnarReadings:
         for at in (np.flatnonzero(quiet)[-LONGEST:] + first).tolist():
             compensated = self._effects[self._effect_of[at]].compensated
             if compensated is not None:
-                parts.append(Part(int(self._decided.sequence[at]), float(self._decided.deviation[at]), compensated))
+                decided, deviation = float(self._decided.decided[at]), float(self._decided.deviation[at])
+                parts.append(Part(int(self._decided.sequence[at]), deviation, compensated, decided - deviation))
         return parts
 
     def _write_average(self, memory: PendingAverage | None) -> None:

@@ -23,7 +23,7 @@ from app.loop.readings.miscounted import TooManyTouches
 from app.loop.readings.records import Entry
 from app.loop.readings.schemas import ReadingIn
 from app.loop.readings.writer.corrections_in_effect import confirm, corrections_in_effect, issued_total
-from app.loop.readings.writer.opposed import name_correction, pauses, remember
+from app.loop.readings.writer.opposed import name_correction, part_of, pauses, remember
 from app.loop.readings.writer.pending import (
     PendingAlarm,
     PendingCorrection,
@@ -33,7 +33,6 @@ from app.loop.readings.writer.pending import (
     Stored,
     Verdict,
 )
-from app.loop.readings.writer.snapshot import Part
 
 
 def decide_one_by_one(
@@ -119,8 +118,8 @@ def decide_reading(pending: PendingWrites, entry: Entry, reading: ReadingIn, now
     )
     decision = judged(state=state)
     late = stream.last_measured_at is not None and measured_at < stream.last_measured_at
-    newest = None if compensated is None or late or jump or fault else Part(sequence, deviation, compensated)
-    opposed = pauses(pending, stream, newest) if decision.amount is not None and newest else None
+    newest = None if compensated is None or late or jump or fault else part_of(sequence, decision, compensated)
+    opposed = pauses(pending, stream, newest, reading, now) if decision.amount is not None and newest else None
     if opposed is not None:
         paused_by, decision = opposed, judged(state=state._replace(paused=True))
     alarms = [_signal(pending, stream, signal, sequence, decision, results, fault) for signal in decision.alarms]

@@ -1,10 +1,12 @@
-"""The guard before each correction: two in a row that did the opposite of what they asked pause their tool.
+"""The guards before each correction: corrections that did the opposite of what they asked, or that act before they are counted.
 
-Judged by `app.core.gain` on the newest parts of the stream (`PendingStream.parts`), when the next correction would go out. A
-reading that asks for nothing is not judged, it is only remembered: the quiet readings of a batch included (`columnar`).
+Judged by `app.core.gain` and `app.core.early` on the newest parts of the stream (`PendingStream.parts`), when the next correction
+would go out; either pauses the tool. A reading that asks for nothing is not judged, it is only remembered: the quiet readings of a
+batch included (`columnar`).
 """
 
 from collections.abc import Sequence
+from datetime import datetime
 from typing import Any
 
 import numpy as np
@@ -12,54 +14,77 @@ import numpy as np
 from app.core.decision.decide import Decision
 from app.core.decision.limits import nanometres
 from app.core.decision.step import Action
+from app.core.early import acts_early
 from app.core.gain import LONGEST, Step, against, expected_scatter, opposed
+from app.loop.readings.schemas import ReadingIn
 from app.loop.readings.writer.pending import PendingAlarm, PendingStream, PendingTool, PendingWrites
 from app.loop.readings.writer.snapshot import Part
-from app.loop.tables.tools import OPPOSITE
+from app.loop.tables.tools import EARLY, OPPOSITE
+
+
+def part_of(sequence: int, decision: Decision, compensated: float) -> Part:
+    """Return what a reading tells of the effect of corrections. compensated: the sum of those its part was cut with, mm."""
+    return Part(sequence, decision.deviation, compensated, decision.decided - decision.deviation)
 
 
 def remember(stream: PendingStream, sequence: int, decision: Decision, compensated: float | None) -> None:
-    """Keep a reading that tells of the gain of corrections. compensated: the sum of those its part was cut with, mm."""
+    """Keep a reading that tells of the effect of corrections. compensated: the sum of those its part was cut with, mm."""
     if stream.tool is not None and compensated is not None and decision.action is not Action.STOP:
-        stream.parts.append(Part(sequence, decision.deviation, compensated))
+        stream.parts.append(part_of(sequence, decision, compensated))
 
 
-def pauses(pending: PendingWrites, stream: PendingStream, newest: Part) -> PendingAlarm | None:
-    """Pause the tool if its two newest corrections did the opposite of what they asked; the alarm, or None.
+def pauses(
+    pending: PendingWrites, stream: PendingStream, newest: Part, reading: ReadingIn, now: datetime
+) -> PendingAlarm | None:
+    """Pause the tool if its corrections did the opposite of what they asked, or act before they are counted; the alarm, or None.
 
-    newest: the reading that asks for the next correction.
+    newest: what is left of the reading that asks for the next correction.
     """
-    tool = stream.tool
+    tool, parameters = stream.tool, stream.parameters
     parts = [*stream.parts[1 - LONGEST :], newest]
     begin = sum(part.sequence <= stream.start.gain_from for part in parts)
     if tool is None or len(parts) - begin < 3:
         return None
-    parameters = stream.parameters
-    found = opposed(
+    deviation, compensated = (
         np.array([part.deviation for part in parts]),
         np.array([part.compensated for part in parts]),
-        parameters.factor,
-        begin,
-        expected_scatter(parameters.zero_range, parameters.averaging_limit),
-        parameters.averaging_limit,
     )
-    if found is None:
+    expected = expected_scatter(parameters.zero_range, parameters.averaging_limit)
+    found = opposed(deviation, compensated, parameters.factor, begin, expected, parameters.averaging_limit)
+    if found is not None:
+        steps = [_said(tool, step) for step in (found.first, found.second)]
+        gain = {"gain": round(found.gain, 3), "error": round(found.error, 3), "corrections": steps}
+        return _paused(pending, stream, tool, newest, OPPOSITE, gain)
+    if parameters.rules.of_tool or not any(part.outstanding for part in parts):
         return None
+    outstanding = np.array([part.outstanding for part in parts])
+    after, share, error = acts_early(deviation, compensated, outstanding, parameters.factor, begin, expected)
+    if after < 0:
+        return None
+    said: dict[str, Any] = {"after": after, "share": round(share, 3), "error": round(error, 3), "by": "confirmation"}
+    if reading.correction_in_effect is not None:
+        said["by"] = "correction_in_effect"
+    elif reading.machined_at is not None:
+        said |= {"by": "machined_at", "lag": round((now - reading.machined_at).total_seconds(), 1)}
+    return _paused(pending, stream, tool, newest, EARLY, said)
+
+
+def _paused(
+    pending: PendingWrites, stream: PendingStream, tool: PendingTool, newest: Part, kind: str, data: dict[str, Any]
+) -> PendingAlarm:
     alarm = PendingAlarm(
         machine_id=tool.machine_id,
         characteristic_id=None,
         tool_memory=tool.number,
-        kind=OPPOSITE,
+        kind=kind,
         sequence=newest.sequence,
         last_sequence=newest.sequence,
         count=1,
         data={
             "characteristic": stream.entry.characteristic,
             "deviation": newest.deviation,
-            "factor": parameters.factor,
-            "gain": round(found.gain, 3),
-            "error": round(found.error, 3),
-            "corrections": [_said(tool, step) for step in (found.first, found.second)],
+            "factor": stream.parameters.factor,
+            **data,
         },
     )
     pending.raised.append(alarm)

@@ -31,7 +31,7 @@ from app.loop.readings.writer.snapshot import (
     Part,
     Snapshot,
 )
-from app.loop.tables.tools import OPEN, OPPOSED
+from app.loop.tables.tools import FELL, OPEN
 
 
 @dataclass(slots=True, kw_only=True)
@@ -150,7 +150,7 @@ class PendingTool:
         if isinstance(self.paused_by, PendingAlarm):
             for correction in self.written():
                 if correction.status == "superseded" and correction.superseded_by is None:
-                    correction.reason = f"{OPPOSED} {self.paused_by.id}"
+                    correction.reason = f"{FELL[self.paused_by.kind]} {self.paused_by.id}"
 
     def written(self) -> list[PendingCorrection]:
         """Return the corrections that were issued or changed."""

@@ -78,11 +78,15 @@ class LoadedAverage(NamedTuple):
 
 
 class Part(NamedTuple):
-    """A reading that tells of the gain of corrections: its deviation, and the sum of those its part was cut with, mm."""
+    """A reading that tells of the effect of corrections: its deviation, and the sum of those its part was cut with, mm.
+
+    outstanding: by how much those that it was cut without will change the size, mm.
+    """
 
     sequence: int
     deviation: float
     compensated: float
+    outstanding: float
 
 
 class LoadedStream(msgspec.Struct, frozen=True, kw_only=True, array_like=True):

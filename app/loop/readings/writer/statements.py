@@ -70,7 +70,8 @@ SELECT json_build_object(
                 s.sequence, s.parameters_version, a.location, t.number, s.paused_by, s.last_measured_at, s.level,
                 s.level_sequence, s.gain_from,
                 coalesce(CASE WHEN t.number IS NOT NULL THEN (
-                    SELECT json_agg(json_build_array(r.sequence, r.deviation, r.compensated) ORDER BY r.sequence)
+                    SELECT json_agg(json_build_array(r.sequence, r.deviation, r.compensated, r.decided - r.deviation)
+                        ORDER BY r.sequence)
                     FROM reading r
                     WHERE r.machine_id = s.machine_id AND r.characteristic_id = s.characteristic_id
                         AND r.sequence > s.sequence - {LONGEST} AND r.compensated IS NOT NULL AND NOT r.late
