@@ -3,7 +3,7 @@
 from collections.abc import Collection, Mapping, Sequence
 from typing import Any, NamedTuple
 
-from sqlalchemy import select
+from sqlalchemy import or_, select
 from sqlalchemy.orm import Session
 
 from app.access.queries import hold_person
@@ -88,9 +88,14 @@ class DeliveryRow(NamedTuple):
 
 
 def deliveries(
-    session: Session, *, receiver_id: int | None = None, before: int | None = None, limit: int = 100
+    session: Session,
+    *,
+    receiver_id: int | None = None,
+    before: int | None = None,
+    limit: int = 100,
+    taken_changes: bool = True,
 ) -> list[DeliveryRow]:
-    """Deliveries, the newest first."""
+    """Deliveries, the newest first. taken_changes: those of changes that a webhook has taken too, one every few seconds."""
     query = (
         select(Delivery, Receiver.name)
         .join(Receiver, Receiver.id == Delivery.receiver_id)
@@ -100,6 +105,8 @@ def deliveries(
     )
     if receiver_id is not None:
         query = query.where(Delivery.receiver_id == receiver_id)
+    if not taken_changes:
+        query = query.where(or_(Delivery.about != "changes", Delivery.state.not_in(("sending", "delivered"))))
     if before is not None:
         query = query.where(Delivery.id < before)
     return [DeliveryRow(*row) for row in session.execute(query)]

@@ -29,8 +29,10 @@ EVERY_DAY = range(1, 8)
 
 
 @router.get("/setup/notifications")
-def notifications_page(request: Request, session: SessionDep, caller: Admin, before: Before = None) -> Response:
-    return _overview(request, session, caller, before=before)
+def notifications_page(
+    request: Request, session: SessionDep, caller: Admin, before: Before = None, show: str = ""
+) -> Response:
+    return _overview(request, session, caller, before=before, everything=show == "all")
 
 
 @router.post("/setup/notifications/receivers")
@@ -76,11 +78,13 @@ def _overview(
     caller: Caller,
     *,
     before: int | None = None,
+    everything: bool = False,
     typed: Mapping[str, str] | None = None,
     error: InbandError | None = None,
     secret: Mapping[str, str] | None = None,
 ) -> Response:
-    rows = queries.deliveries(session, before=before, limit=ON_PAGE + 1)
+    rows = queries.deliveries(session, before=before, limit=ON_PAGE + 1, taken_changes=everything)
+    here = partial(address, "/setup/notifications", show="all" if everything else None)
     receivers = queries.receivers(session)
     names = {row.id: row.name for row in receivers}
     return setup_page(
@@ -91,7 +95,8 @@ def _overview(
         status=error.status if error else 200,
         receivers=receivers,
         routes=[(row, _summary(row.rule, names)) for row in queries.routes(session)],
-        part=part_of(rows, ON_PAGE, before, lambda row: row.delivery.id, partial(address, "/setup/notifications")),
+        part=part_of(rows, ON_PAGE, before, lambda row: row.delivery.id, here),
+        everything=everything,
         typed=typed or {},
         errors=by_field(error) if error else {},
         problem=error if error and not error.errors else None,

@@ -6,6 +6,7 @@ from typing import Any
 import pytest
 from playwright.sync_api import Page, expect
 
+from app.loop.notifications.tables import Delivery, Receiver
 from tests.conftest import Server
 from tests.shop import Person, Shop, unique
 
@@ -47,6 +48,24 @@ def test_a_receiver_is_added_tested_and_its_delivery_is_seen(shop: Shop, admin: 
     delivery = page.locator("#delivery-list tr").filter(has_text=name)
     expect(delivery).to_contain_text("INBAND_MAIL_SERVER")  # of this server, which has none; it comes by itself
     expect(row).to_contain_text("1 failure")
+
+
+def test_changes_that_were_taken_hide_no_delivery(shop: Shop, admin: Person) -> None:
+    """An andon takes one every few seconds; whether a mail has arrived must still be seen."""
+    name = unique("andon")
+    with shop.server.database.begin() as session:
+        row = Receiver(name=name, means="webhook", address="http://127.0.0.1:9/", created_by="tests")
+        session.add(row)
+        session.flush()
+        for about, state, subject in (
+            ("alarms", "delivered", "Oversize"), ("changes", "failed", "7 changes"), ("changes", "delivered", "9 changes")
+        ):  # fmt: skip
+            session.add(Delivery(receiver_id=row.id, about=about, subject=f"{subject} {name}", state=state))
+    page = admin.open("/setup/notifications")
+    assert f"Oversize {name}" in page
+    assert f"7 changes {name}" in page
+    assert f"9 changes {name}" not in page
+    assert f"9 changes {name}" in admin.open("/setup/notifications?show=all")
 
 
 def test_a_route_is_made_changed_and_deleted(shop: Shop, admin: Person) -> None:
