@@ -598,7 +598,7 @@ class Campaign:
             together = [*merged.get(number, []), number]
             step, wanted = scale * (after - before), sum(known[each]["amount"] for each in together)
             assert abs(step - wanted) < scale * TOLERANCE, (
-                f"correction {number} was {wanted}, the offset went by {step}"
+                f"correction {number} was {wanted}, with {together}, the offset went by {step} from {before}: {model.history}"
             )
         _no_edit_overwritten(model)
         offsets = control.offsets
