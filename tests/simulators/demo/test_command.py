@@ -22,10 +22,10 @@ def signed_in(port: int, log: Path) -> None:
         assert client.post("/sign-in", data=body).is_redirect
 
         def readings(characteristic: str) -> int:
-            answer = client.get("/api/v1/readings", params={"characteristic": characteristic, "limit": 50})
+            answer = client.get("/api/v1/readings", params={"characteristic": characteristic, "limit": 20})
             return len(answer.json()["items"]) if answer.is_success else 0
 
-        until(lambda: readings("plate-d30") == 50 and readings("spigot-d30"), 120)
+        until(lambda: readings("plate-d30") == 20 and readings("spigot-d30"), 120)
 
 
 @pytest.mark.parametrize("start", [Forked, pytest.param(begun, marks=pytest.mark.long)])
