@@ -10,6 +10,7 @@ from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from typing import Any
 
+from app.memory import reading_modules
 from app.quality.proof.cases import Case, Value, cases
 
 log = logging.getLogger(__name__)
@@ -111,7 +112,8 @@ _proof: Proof | None = None
 
 def _prove() -> None:
     global _proof  # noqa: PLW0603 - one per process, as the engine is
-    proof = run(cases())
+    with reading_modules():  # most of it is loading the engine
+        proof = run(cases())
     for result in proof.failing:
         log.error("not as published: %s (%s)", result.case.name, result.error or result.case.source)
     _proof = proof
