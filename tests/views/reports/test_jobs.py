@@ -293,6 +293,8 @@ class TestKilled:
         assert "the process that makes reports ended with -9" in failure["error"]
         with psycopg.connect(server.database.dsn) as connection:
             connection.execute("UPDATE job_failure SET retry_at = now()")  # not in a minute
+        another = ask(bores, characteristics=keys(1))["id"]  # the server looks at once, not within two seconds
+        bores.call("POST", f"/reports/{another}/cancel")
         job = done(bores, number)
         assert (job["state"], job["done"], job["problems"]) == ("done", 2, 0)
         whole = fetched(bores, number)
