@@ -40,7 +40,7 @@ LEVEL_STEP = 0.1  # variance of a step of the level over that of the scatter
 # Parts before the first correction that show how the size wears or warms up; the sum of squares that a slope of none is worth.
 TREND, SHRUNK = 17, 60.0
 OPPOSITE = -0.2  # the gain is below this: with wear, that of corrections that do nothing is a little below 0
-SURE_OPPOSITE, SURE_NOT_WEAK = 2.0, 4.5  # standard errors that the gain is below 0, and below half
+SURE_OPPOSITE, SURE_NOT_WEAK = 2.0, 4.75  # standard errors that the gain is below 0, and below half
 LARGEST_ERROR = 0.36  # of the gain
 LEAST = 1.5  # times the scatter that each of the two asks for: smaller ones say nothing
 UNLIKE = (
