@@ -27,6 +27,7 @@ import app
 from app.errors import InbandError, TooManyRequests
 from app.files.formats.delimited import Unusable
 from app.language.i18n import _, current_language, speaking
+from app.memory import BEHIND
 
 log = logging.getLogger(__name__)
 Result = TypeVar("Result")
@@ -37,7 +38,7 @@ WAIT = 30.0  # s for one of them to end
 PATIENCE = 3  # times the limit of processor time may pass by the clock
 YESTERDAY = 24 * 3600.0  # s
 PREFIX = "inband-file-"
-PROGRAM = "from app.files.apart import begin; begin()"
+PROGRAM = f"{BEHIND}; from app.files.apart import begin; begin()"
 OUT_OF_MEMORY, OUT_OF_ROOM, DISK_FULL, OUT_OF_TIME = 10, 11, 12, 13  # as it ends
 ENDED_BY_TIME = {OUT_OF_TIME, *(-getattr(signal, name) for name in ("SIGXCPU", "SIGKILL") if hasattr(signal, name))}
 
@@ -201,7 +202,6 @@ def _keep(limits: Limits) -> None:
         import resource
     except ModuleNotFoundError:  # Windows: the clock of the server is the only limit
         return
-    os.nice(5)
     for kind, most in (
         (resource.RLIMIT_CPU, limits.seconds),
         (resource.RLIMIT_DATA, limits.memory),

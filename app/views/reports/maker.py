@@ -7,7 +7,6 @@ What a report shows is read from the standby, where one is named and has everyth
 """
 
 import logging
-import os
 import signal
 import sys
 import time
@@ -37,7 +36,6 @@ from app.views.reports.bundle import MOST_BYTES, Bundle, Part, file_name, packed
 log = logging.getLogger(__name__)
 
 LONGEST_REST = 1.0  # s
-NICE = 5
 NAME = "making_reports"  # as periodic jobs have one, where it fails
 
 
@@ -144,8 +142,6 @@ def main() -> None:
     settings = Settings.model_validate_json(sys.stdin.readline())
     logs.configure(settings.log_level, settings.log_format)
     use_zone(settings)
-    if hasattr(os, "nice"):  # Windows has not
-        os.nice(NICE)
     with Connections(settings.database_url or "", settings.database_patience) as connections:
         database = Database(
             settings.database_url or "", pool_size=2, application_name="inband-reports", connections=connections

@@ -23,6 +23,7 @@ import app
 from app.db.engine import Database
 from app.db.outage import Outage
 from app.jobs.actions import DatabaseGone, Unit, note_failure, paused_units
+from app.memory import BEHIND
 from app.settings import Settings
 from app.views.reports import queries
 from app.views.reports.maker import NAME
@@ -32,7 +33,7 @@ log = logging.getLogger(__name__)
 EVERY = 2.0  # s between two looks for something to do
 KEPT = 30.0  # s that the process waits for more
 END_WITHIN = 10.0  # s
-PROGRAM = """
+PROGRAM = f"""{BEHIND}
 from app.memory import reading_modules
 with reading_modules():
     from app.views.reports.maker import main
