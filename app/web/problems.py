@@ -15,6 +15,7 @@ from fastapi.routing import iter_route_contexts
 from sqlalchemy import exc as sql
 from starlette.exceptions import HTTPException
 from starlette.middleware.exceptions import ExceptionMiddleware
+from starlette.requests import ClientDisconnect
 from starlette.responses import JSONResponse, RedirectResponse, Response
 from starlette.routing import Route
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
@@ -285,6 +286,8 @@ class LastResort:
         with speaking(negotiate(request.headers.get("accept-language"))):
             try:
                 await self.app(scope, receive, sending)
+            except ClientDisconnect:
+                return  # nobody is left to answer; the log says "broken off"
             except Exception as error:
                 if started:
                     raise  # half an answer has left; the server must break the connection

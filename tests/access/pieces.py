@@ -22,28 +22,41 @@ class Sent(NamedTuple):
 
 
 def send(
-    server: InProcess, method: str, path: str, size: int, kind: str, caller: dict[str, str], *, announced: bool = False
+    server: InProcess,
+    method: str,
+    path: str,
+    size: int,
+    kind: str,
+    caller: dict[str, str],
+    *,
+    announced: bool = False,
+    leaves: bool = False,
 ) -> Sent:
-    """Send a body of this size. caller: the headers by which one is known; announced: with its length, else in pieces until it ends."""
+    """Send a body of this size. caller: the headers by which one is known; announced: with its length, else in pieces until it ends.
+
+    leaves: the connection ends before the body does.
+    """
     direct = server.transport
     assert isinstance(direct, Direct)
     headers = (
         caller | {"Host": "inband.test", "Content-Type": kind} | ({"Content-Length": str(size)} if announced else {})
     )
-    return direct.portal.call(_send, direct, method, path, size, headers)
+    return direct.portal.call(_send, direct, method, path, size, headers, leaves)
 
 
-async def _send(direct: Direct, method: str, path: str, size: int, headers: dict[str, str]) -> Sent:
+async def _send(direct: Direct, method: str, path: str, size: int, headers: dict[str, str], leaves: bool) -> Sent:
     keep_time_of(direct.time)
     read, said = 0, list[Message]()
 
     async def receive() -> Message:
         nonlocal read
         if read >= size:
+            if leaves:
+                return {"type": "http.disconnect"}
             await asyncio.Event().wait()  # nobody hangs up
         piece = b"[" * min(PIECE, size - read)
         read += len(piece)
-        return {"type": "http.request", "body": piece, "more_body": read < size}
+        return {"type": "http.request", "body": piece, "more_body": leaves or read < size}
 
     async def send(message: Message) -> None:
         said.append(message)

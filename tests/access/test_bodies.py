@@ -81,6 +81,15 @@ def test_no_route_reads_more_of_a_stranger_than_a_few_kilobytes(server: InProces
     assert not wrong
 
 
+@pytest.mark.parametrize(("path", "kind"), [("/api/v1/notes", JSON), ("/sign-in", FORM)])
+def test_who_leaves_before_the_body_ends_is_no_error_of_the_server(
+    server: InProcess, path: str, kind: str, caplog: pytest.LogCaptureFixture
+) -> None:
+    caller = {"Authorization": f"Bearer {server.key('engineer')}"}
+    assert send(server, "POST", path, 2 * PIECE - 1, kind, caller, leaves=True).text == ""
+    assert caplog.text == ""
+
+
 @pytest.mark.parametrize("kind", [FORM, FILE])
 @pytest.mark.parametrize("path", ["/sign-in", "/invitation/guess", "/station"])
 def test_what_is_announced_too_large_is_not_read_at_all(server: InProcess, path: str, kind: str) -> None:
