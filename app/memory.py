@@ -1,4 +1,4 @@
-"""What a process takes from the system: memory that is free goes back, and long work gives way.
+"""Memory and turns of a process: what is free goes back to the system, and long work gives way.
 
 Pages, charts and reports take some megabytes each for a moment, in threads. glibc keeps what is freed: an arena for every few
 threads, with holes that the next request does not fit into, so a server that stores nothing in memory grows for hours. With few
@@ -17,7 +17,8 @@ ARENAS = 2  # more of them help only threads that allocate at the same time, whi
 LARGE = 512 * 1024  # bytes from which a block comes from the system and goes back when it is freed
 EVERY = 60.0  # s between two times that free memory is given back
 _M_MMAP_THRESHOLD, _M_ARENA_MAX = -3, -8  # of malloc.h
-BEHIND = "import os; hasattr(os, 'nice') and os.nice(10)"
+NICE = 10
+BEHIND = f"import os; hasattr(os, 'nice') and os.nice({NICE})"
 """First words of the program of a process for long work: it gives way to its server, so that readings go first. To read the
 modules takes such a process longer than many a task."""
 

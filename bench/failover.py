@@ -27,6 +27,7 @@ from app.access.keys import add_key
 from app.core.parameters import read
 from app.db.engine import Database
 from bench.plant import free_port, wait_until_ready
+from tests.conftest import make_whole
 from tests.db.clusters import cluster, wait_for
 from tests.db.managed import MISSING, managed
 from tests.loop.readings.load import Sender, all_at_once, scattered
@@ -243,7 +244,8 @@ def main() -> None:
             with managed(folder) as kept:
                 result = behind_two(kept, folder, arguments.rounds)
         else:
-            with cluster(folder) as servers:
+            make_whole(folder / "whole")
+            with cluster(folder, folder / "whole") as servers:
                 servers.ask_for(quorum=not arguments.asynchronous)
                 result = behind_two(servers, folder, arguments.rounds)
     print("round  promoted  answered before  seconds until all were served again  pg_rewind")

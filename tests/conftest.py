@@ -285,11 +285,16 @@ def whole_cluster(shared_dir: Path) -> Path:
     with (shared_dir / "whole.lock").open("w") as lock:
         fcntl.flock(lock, fcntl.LOCK_EX)
         if not folder.exists():
-            made = EmbeddedServer(folder.with_name("whole.new"), {"fsync": "off"})
-            migrate.upgrade(made.start())
-            made.stop()
-            made.data_dir.rename(folder)
+            make_whole(folder)
     return folder
+
+
+def make_whole(folder: Path) -> None:
+    """Make a data folder as `whole_cluster` gives."""
+    made = EmbeddedServer(folder.with_name("whole.new"), {"fsync": "off"})
+    migrate.upgrade(made.start())
+    made.stop()
+    made.data_dir.rename(folder)
 
 
 def copied(whole: Path, data_dir: Path) -> Path:

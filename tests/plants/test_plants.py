@@ -30,6 +30,10 @@ PASSWORD = "correct horse battery"
 get = partial(httpx.get, timeout=60, verify=TLS)
 
 
+def is_ready(server: Server, key: str) -> bool:
+    return bool(get(f"{server.url}/p/{key}/health/ready").status_code == httpx.codes.OK)
+
+
 @pytest.fixture(scope="module")
 def server(new_database: NewDatabase, run_server: RunServer) -> Iterator[Server]:
     """A server with a plant at its root, which was there before, and two more: `north` in Kolkata's time, `south`."""
@@ -40,7 +44,7 @@ def server(new_database: NewDatabase, run_server: RunServer) -> Iterator[Server]
         for key in ("north", "south"):
             with in_plant(running, key) as session:
                 people.add_person(session, name="Mira", role="engineer", password=PASSWORD, actor="tests")
-            until(lambda key=key: get(f"{running.url}/p/{key}/health/ready").status_code == 200)
+            until(partial(is_ready, running, key))
         yield running
 
 

@@ -2,6 +2,7 @@
 
 import re
 from collections.abc import Iterator
+from functools import partial
 from pathlib import Path
 
 import httpx
@@ -10,7 +11,7 @@ import pytest
 from app.access import actions as people
 from tests.conftest import RunServer, Server, short_folder
 from tests.db.clusters import Cluster, cluster
-from tests.plants.test_plants import PASSWORD, add, client_of, get, in_plant, read, set_up
+from tests.plants.test_plants import PASSWORD, add, client_of, get, in_plant, is_ready, read, set_up
 from tests.shop import PARAMETERS
 from tests.waits import until
 from tests.web.test_replica import BEHIND, paused
@@ -36,7 +37,7 @@ def server(servers: Cluster, run_server: RunServer) -> Iterator[Server]:
             for key in KEYS:
                 with in_plant(running, key) as session:
                     people.add_person(session, name="Mira", role="engineer", password=PASSWORD, actor="tests")
-                until(lambda key=key: get(f"{running.url}/p/{key}/health/ready").status_code == 200)
+                until(partial(is_ready, running, key))
             yield running
 
 

@@ -20,9 +20,9 @@ from psycopg.rows import dict_row
 from pypdf import PdfReader
 
 from app.access import actions as people
+from app.memory import NICE
 from app.views.reports import actions
 from app.views.reports.bundle import Bundle
-from app.views.reports.maker import NICE
 from app.views.reports.request import ReportRequest, SectionName
 from app.views.reports.tables import ReportJob
 from tests.conftest import RunServer, Server
@@ -285,7 +285,7 @@ class TestKilled:
             number = ask(bores, characteristics=keys(2), sections=["numbers"])["id"]
             let_one_pass(number)
             (maker,) = makers(server)
-            first, second = (os.getpriority(os.PRIO_PROCESS, pid) for pid in (server.process.pid, maker))
+            first, second = (os.getpriority(os.PRIO_PROCESS, pid or 0) for pid in (server.process.pid, maker))
             assert second >= min(first + NICE, 19), "readings go first"
             os.kill(maker, signal.SIGKILL)
             (failure,) = until(lambda: failures(bores, number))
