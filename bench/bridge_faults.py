@@ -593,9 +593,11 @@ class Campaign:
             self._until(settled, "corrections are confirmed", 15)
         assert len(set(numbers)) == len(numbers), f"applied twice: {sorted(n for n in numbers if numbers.count(n) > 1)}"
         known = self._corrections()
-        merged = self._merged()
+        merged, acted = self._merged(), set[int]()
         for number, before, after in model.applied:
-            together = [*merged.get(number, []), number]
+            # an order takes along what the control had taken already, too, while the bridge did not know it: no step is left of that
+            together = [each for each in (*merged.get(number, []), number) if each not in acted]
+            acted.update(together)
             step, wanted = scale * (after - before), sum(known[each]["amount"] for each in together)
             assert abs(step - wanted) < scale * TOLERANCE, (
                 f"correction {number} was {wanted}, with {together}, the offset went by {step} from {before}: {model.history}"
