@@ -26,9 +26,10 @@ def batch(shop: Shop, readings: list[Any], client: httpx.Client | None = None, *
     return (client or shop.machine_client).post("/api/v1/readings/batch", json=readings, params=query)
 
 
-def refused(shop: Shop, status: int, readings: list[Any], **more: Any) -> dict[str, Any]:
-    """A batch that must be refused and leave no trace."""
+def refused(shop: Shop, status: int, readings: list[Any], *, alarms: int = 0, **more: Any) -> dict[str, Any]:
+    """A batch that must be refused and leave no trace but so many alarms."""
     before = counts(shop.server.database.dsn)
+    before = before | {table: before[table] + alarms for table in ("alarm", "event")}
     answer = batch(shop, readings, **more)
     assert answer.status_code == status, answer.text
     assert answer.headers["content-type"] == "application/problem+json"
@@ -137,7 +138,7 @@ class TestAllOrNothing:
         readings = good(shop, 5)
         readings[1]["correction_in_effect"] = 7
         readings[4] = {"characteristic": shop.characteristic, "touches": [[40.0], [40.0]]}
-        problem = refused(shop, 422, readings)
+        problem = refused(shop, 422, readings, alarms=1)  # of too many touches: nobody else would see them
         assert fields(problem) == ["[1].correction_in_effect", "[4].touches"]
         assert problem["detail"].startswith("2 of 5 readings cannot be taken; the first is [1]")
 

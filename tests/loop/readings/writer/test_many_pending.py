@@ -39,9 +39,12 @@ def pending_on(*corrections: LoadedCorrection, **parameters: Any) -> PendingWrit
     return PendingWrites(snapshot)
 
 
-def sizes(count: int, step: float = 0.007) -> list[float]:
-    """Each asks for a correction, although all those before are counted in."""
-    return [40 + (step if at % 2 == 0 else 0) for at in range(count)]
+def sizes(count: int) -> list[float]:
+    """Each asks for a correction, although all those before are counted in; in no order that looks like their effect."""
+    rng, deviations = Random(7), [0.0]
+    for _part in range(count):
+        deviations.append(rng.choice([each for each in (-0.0105, -0.0035, 0.0035, 0.0105) if each != deviations[-1]]))
+    return [40 + each for each in deviations[1:]]
 
 
 def counted(monkeypatch: pytest.MonkeyPatch, owner: Any, name: str) -> list[int]:
