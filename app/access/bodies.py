@@ -8,6 +8,7 @@ import asyncio
 from collections.abc import Iterable
 from typing import NamedTuple
 from urllib.parse import unquote_plus
+from weakref import WeakValueDictionary
 
 from fastapi import FastAPI, Request
 from starlette.routing import BaseRoute, Route
@@ -17,7 +18,7 @@ from app.access.callers import Caller
 from app.access.recognition import caller_of, device_at
 from app.errors import FieldError, InbandError, NotAllowed, NotSignedIn, TooLarge
 from app.language.i18n import _
-from app.web.deps import SAFE_METHODS
+from app.web.deps import SAFE_METHODS, STATION_COOKIE
 from app.web.limits import DEFAULT, FORM, Takes, taken_by, too_large
 
 
@@ -31,6 +32,7 @@ PIECE = 8000
 MOST_ESCAPED = 50_000
 """Bytes of one field of a form that do not stand for themselves: all of it is made a text in one turn, some 15 ms. Pages whose
 fields take longer texts send their form as multipart, in which everything stands for itself."""
+NOBODY = "nobody"
 _PLAIN = bytes(set(range(128)) - {ord("%")})
 
 
@@ -42,10 +44,16 @@ class Allowance(NamedTuple):
 
 
 class BodyLimit:
-    """ASGI middleware around the routes of an application."""
+    """ASGI middleware around the routes of an application.
+
+    Forms of one device or of one unknown address are answered one after the other, and so are all requests that are refused because
+    nobody is known to send them: a hundred that come at once are a hundred turns of the event loop with readings in between. A guess
+    takes as much processor as ten readings.
+    """
 
     def __init__(self, app: ASGIApp, routes: Iterable[BaseRoute]) -> None:
         self.app = app
+        self._turns: WeakValueDictionary[str, asyncio.Lock] = WeakValueDictionary()
         self._declared = [
             (route.path_regex, route.methods or (), taken)
             for route in routes
@@ -57,14 +65,22 @@ class BodyLimit:
             await self.app(scope, receive, send)
             return
         request = Request(scope)
-        allowance = await _allowance(request, self._taken(scope))
+        taken = self._taken(scope)
+        allowance = await _allowance(request, taken)
+        turn = NOBODY if allowance.most < 0 else ""
         if _announced(request) > allowance.most:
             receive = _refusing(allowance.beyond)
         elif request.headers.get("content-type", "").startswith("multipart/"):
             receive = _counted(receive, allowance)
         else:
             receive = await _read(receive, allowance, _is_form(request))
-        await self.app(scope, receive, send)
+            turn = turn or _place(request, taken)
+        if not turn:
+            await self.app(scope, receive, send)
+            return
+        async with self._turns.setdefault(turn, asyncio.Lock()):
+            await asyncio.sleep(0)  # others of this place wait now, whatever the application does at once
+            await self.app(scope, receive, send)
 
     def _taken(self, scope: Scope) -> Takes:
         path, method = scope["path"], scope["method"]
@@ -88,6 +104,13 @@ async def _allowance(request: Request, taken: Takes) -> Allowance:
     if wrong is not None:
         return Allowance(min(taken.most, DEFAULT.most), wrong)
     return Allowance(taken.most, too_large(taken.most, pictures=taken.pictures))
+
+
+def _place(request: Request, taken: Takes) -> str:
+    """Where a form comes from whose sender is not known yet: the device, or the address. Empty for a caller who is known."""
+    if token := request.cookies.get(STATION_COOKIE):
+        return token
+    return request.client.host if taken.by == "anybody" and request.client else ""
 
 
 def _not_allowed(caller: Caller, taken: Takes) -> NotAllowed | None:

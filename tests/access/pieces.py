@@ -41,10 +41,11 @@ def send(
     headers = (
         caller | {"Host": "inband.test", "Content-Type": kind} | ({"Content-Length": str(size)} if announced else {})
     )
-    return direct.portal.call(_send, direct, method, path, size, headers, leaves)
+    return direct.portal.call(arrive, direct, method, path, size, headers, leaves)
 
 
-async def _send(direct: Direct, method: str, path: str, size: int, headers: dict[str, str], leaves: bool) -> Sent:
+async def arrive(direct: Direct, method: str, path: str, size: int, headers: dict[str, str], leaves: bool) -> Sent:
+    """As one of many in the same event loop; see `send`."""
     keep_time_of(direct.time)
     read, said = 0, list[Message]()
 

@@ -1,5 +1,6 @@
 """Bodies of requests: nothing is read before it is known from the head who sends them, and no further than that caller may send."""
 
+import asyncio
 import json
 import re
 import threading
@@ -15,7 +16,7 @@ from app.main import ROUTERS
 from app.web import json_bodies
 from app.web.deps import SAFE_METHODS
 from app.web.limits import FEW, MEGABYTE
-from tests.access.pieces import PIECE, send
+from tests.access.pieces import PIECE, arrive, send
 from tests.conftest import NewDatabase, drop_database
 from tests.in_process import Direct, InProcess, in_process
 from tests.shop import Person, Shop
@@ -79,6 +80,33 @@ def test_no_route_reads_more_of_a_stranger_than_a_few_kilobytes(server: InProces
         if sent.read > most or sent.status not in usual:
             wrong.append((method, path, kind, sent))
     assert not wrong
+
+
+def test_of_strangers_who_come_at_once_each_has_a_turn_of_the_event_loop(server: InProcess) -> None:
+    direct = server.transport
+    assert isinstance(direct, Direct)
+    finished: list[int] = []
+
+    async def all_at_once() -> list[int]:
+        """Requests answered in each turn of the loop."""
+        strangers = [asyncio.create_task(stranger(direct)) for _each in range(20)]
+        turns = []
+        while len(finished) < len(strangers):
+            before = len(finished)
+            await asyncio.sleep(0)
+            turns.append(len(finished) - before)
+        await asyncio.gather(*strangers)
+        return turns
+
+    async def stranger(direct: Direct) -> None:
+        sent = await arrive(
+            direct, "POST", "/api/v1/notes", 2, {"Host": "inband.test", "Content-Type": JSON}, leaves=False
+        )
+        finished.append(sent.status)
+
+    turns = direct.portal.call(all_at_once)
+    assert max(turns) == 1
+    assert finished == [401] * 20
 
 
 @pytest.mark.parametrize(("path", "kind"), [("/api/v1/notes", JSON), ("/sign-in", FORM)])
