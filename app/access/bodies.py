@@ -107,7 +107,7 @@ async def _allowance(request: Request, taken: Takes) -> Allowance:
 
 
 def _place(request: Request, taken: Takes) -> str:
-    """Where a form comes from whose sender is not known yet: the device, or the address. Empty for a caller who is known."""
+    """The device or the address that a form of somebody unknown comes from; empty for a caller who is known."""
     if token := request.cookies.get(STATION_COOKIE):
         return token
     return request.client.host if taken.by == "anybody" and request.client else ""

@@ -102,4 +102,4 @@ def test_a_clock_that_is_behind_is_found_before_parts_are_out(late: int, delay: 
         unwatched.append(life(rules, of, late, 0.008, False)[1])
     assert sum(part >= 0 for part in stopped) >= 19
     assert np.mean(unwatched) > 15
-    assert np.mean(out) < np.mean(unwatched) / 5
+    assert np.mean(out) < np.mean(unwatched) / 3
