@@ -7,7 +7,16 @@ import pytest
 from numpy.typing import NDArray
 
 from app.core.compiled import plain
-from app.core.effect import FEWEST_CORRECTIONS, FEWEST_READINGS, LONGEST, Effect, _missed, gain_of, measured_effect
+from app.core.effect import (
+    FEWEST_CORRECTIONS,
+    FEWEST_READINGS,
+    LONGEST,
+    Effect,
+    _missed,
+    _verdict,
+    gain_of,
+    measured_effect,
+)
 from app.core.replay import Policy, ReplayedCharacteristic, run, without_events
 from app.core.spc.refusal import Reason, Refused
 from tests.core.conftest import SEAT
@@ -124,6 +133,15 @@ def test_a_gain_is_found_from_few_corrections_whatever_it_is(gain: float, verdic
     assert found is not None
     assert (found.verdict, found.corrections) == (verdict, 5)
     assert found.low < gain < found.high
+
+
+@pytest.mark.parametrize(
+    ("low", "high", "verdict"), [(-0.1, 0.4, "none"), (-0.1, 0.6, "weak"), (0.1, 0.4, "weak"), (-0.1, 0.8, None)]
+)
+def test_an_offset_is_said_to_be_unused_only_where_a_half_is_ruled_out(
+    low: float, high: float, verdict: str | None
+) -> None:
+    assert _verdict(low, high) == verdict
 
 
 def test_corrections_after_every_part_of_even_wear_tell_no_gain() -> None:
