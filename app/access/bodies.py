@@ -107,7 +107,7 @@ async def _allowance(request: Request, taken: Takes) -> Allowance:
 
 
 def _place(request: Request, taken: Takes) -> str:
-    """The device or the address that a form of somebody unknown comes from; empty for a caller who is known."""
+    """The token of the device, or the address of an unknown sender: forms of one place take turns. Empty for a known caller."""
     if token := request.cookies.get(STATION_COOKIE):
         return token
     return request.client.host if taken.by == "anybody" and request.client else ""

@@ -27,7 +27,7 @@ LATEST = 5  # parts that may be on the way
 CHANGES = 3  # of u, by more than this many times the scatter that is expected
 CLEAR = 2.0
 NEARER = 0.5  # h is nearer to 1 than to 0,
-SURE, LOWEST = 5.5, 0.3
+SURE, LOWEST = 5.5, 0.3  # and this many standard errors above that
 LEVEL_STEP = 0.1  # variance of a step of the level over that of the scatter
 PRIOR, FEW = 3.0, 90.0  # parts that the expected scatter is worth; errors are 1 + FEW / parts squared times as large
 

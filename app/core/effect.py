@@ -47,10 +47,10 @@ STEPS_OF_LEVEL = (0.0, 0.001, 0.01, 0.05, 0.2, 1.0)  # variance of a step over t
 STEPS_OF_SLOPE = (0.0, 1e-6, 1e-5, 1e-4, 1e-3, 1e-2)
 PASSES = 4
 FEWEST_FOR_GAIN, FEWEST_PARTS = 4, 12
-HALF = 0.5
 STARTS = (1.0, 0.0, 0.5, 2.0, -1.0)
 CREDIBLE = 0.9999  # of confidence, two-sided, for a verdict on the gain
 HALVED, DOUBLED = 0.75, 1.5  # nearer to 1/2 or to 2 than to 1
+HALF = 0.5  # where this is not ruled out, no alarm says that the control does not use the offset
 
 
 class Effect(NamedTuple):

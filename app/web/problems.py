@@ -287,7 +287,7 @@ class LastResort:
             try:
                 await self.app(scope, receive, sending)
             except ClientDisconnect:
-                return  # nobody is left to answer; the log says "broken off"
+                return  # nobody is left to answer
             except Exception as error:
                 if started:
                     raise  # half an answer has left; the server must break the connection
