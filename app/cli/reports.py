@@ -14,7 +14,7 @@ from app.cli.data import SINCE, UNTIL, Zone
 from app.errors import InbandError
 from app.files.documents.content import Format, Paper
 from app.language.i18n import _, ngettext
-from app.views.reports.request import ReportRequest, SectionName, typed
+from app.views.reports.request import ReportRequest, SectionName, context_of, typed
 
 if TYPE_CHECKING:
     from app.db.engine import Database
@@ -30,9 +30,22 @@ def report_files(
     until: Annotated[str | None, typer.Option("--to", envvar="INBAND_TO", help=UNTIL)] = None,
     last: Annotated[
         int | None,
-        typer.Option(envvar="INBAND_LAST", min=1, help="Only the last N.", show_default="1000 if no period is named"),
+        typer.Option(
+            envvar="INBAND_LAST",
+            min=1,
+            help="Only the last N.",
+            show_default="1000 if neither period nor context is named",
+        ),
     ] = None,
     timezone: Zone = None,
+    context: Annotated[
+        list[str] | None,
+        typer.Option(
+            help="Only readings that say this in their context: order=A-4711; may be named more than once.",
+            metavar="FIELD=VALUE",
+            show_default="all readings",
+        ),
+    ] = None,
     section: Annotated[
         list[SectionName] | None,
         typer.Option(help="Only this section; may be named more than once.", show_default="all"),
@@ -64,6 +77,7 @@ def report_files(
             "paper": paper.value,
         },
         [name.value for name in section or ()],
+        context_of(_said(context or ())),
     )
     _check(keys, form, output)
     from app.quality.proof import queries as proof
@@ -81,6 +95,19 @@ def report_files(
     say(ngettext("%(num)d report written.", "%(num)d reports written.", many) % {"num": many})
     if failed:
         raise typer.Exit(1)
+
+
+def _said(pairs: Sequence[str]) -> dict[str, str]:
+    """The values by their fields, as they were typed."""
+    said: dict[str, str] = {}
+    for pair in pairs:
+        field, sign, value = (each.strip() for each in pair.partition("="))
+        if not sign or not value or said.setdefault(field, value) != value:
+            raise typer.BadParameter(
+                _("write it as order=A-4711, each field once; this is {text}").format(text=repr(pair[:60])),
+                param_hint="--context",
+            )
+    return said
 
 
 def _form_by(output: Path | None) -> Format:

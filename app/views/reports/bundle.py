@@ -14,7 +14,7 @@ from app.core.period import Period
 from app.files.documents.content import Format, Paper, Report
 from app.files.documents.files import MEDIA_TYPES, file_of, workbook
 from app.files.formats.delimited import defused
-from app.views.reports.request import ReportRequest, SectionName
+from app.views.reports.request import ReportRequest, SectionName, context_of
 from app.web.choice import in_address
 
 BundleFormat = Literal["pdf", "xlsx", "csv", "workbook"]
@@ -43,6 +43,7 @@ class Bundle:
             "sections": [name.value for name in request.sections],
             "paper": request.paper.value,
             "timezone": request.zone,
+            "context": {field.value: value for field, value in request.context},
             "format": self.form,
             "language": self.language,
         }
@@ -57,6 +58,7 @@ class Bundle:
             tuple(SectionName(name) for name in stored["sections"]),
             Paper(stored["paper"]),
             stored["timezone"],
+            context=context_of(stored.get("context", {})),
         )
         return cls(request, stored["format"], language=stored["language"], keys=stored["characteristics"])
 

@@ -10,18 +10,20 @@ from starlette.datastructures import FormData
 from starlette.responses import RedirectResponse
 
 from app.access.deps import Caller, Viewer
+from app.core.context import Chosen, ContextField
 from app.errors import InbandError, Invalid
 from app.files.documents.content import Paper
 from app.language.i18n import _, current_language
 from app.loop.characteristics import queries as characteristics
 from app.loop.characteristics.queries import CurrentCharacteristic
+from app.loop.summaries.wording import context_form, context_words
 from app.quality.proof import queries as proof
 from app.quality.proof import wording as proof_wording
 from app.views.reports import actions, queries
 from app.views.reports.actions import KEPT_DAYS
 from app.views.reports.bundle import Bundle
 from app.views.reports.jobs_api import Number, report_worker
-from app.views.reports.request import SectionName, typed
+from app.views.reports.request import SectionName, context_of, typed
 from app.web.deps import Before, SessionDep, texts
 from app.web.forms import by_field
 from app.web.paging import address, part_of
@@ -123,6 +125,8 @@ def _page(
         troubles={job.id: queries.troubles(session, job.id) for job in jobs.rows if job.problems},
         may_cancel=lambda job: queries.may_end(job, caller),
         state_word=state_word,
+        of_context=context_form({field: [] for field in ContextField}, _typed_context(given or {})),
+        only=lambda job: context_words(context_of(job.request.get("context", {}))),
         wanted=lambda name: part is None or part == name,
         machines=_by_machine(session) if part is None else [],
         chosen=set(chosen),
@@ -142,6 +146,11 @@ def _page(
         proof_failing=failing,
         proof_warning=proof_wording.warning(len(failing)),
     )
+
+
+def _typed_context(given: dict[str, str]) -> Chosen:
+    """The context as it was typed, right or wrong."""
+    return tuple((field, value) for field in ContextField if (value := given.get(f"context.{field.value}", "")))
 
 
 def _by_machine(session: Session) -> list[tuple[str, list[CurrentCharacteristic]]]:

@@ -6,17 +6,20 @@ from zoneinfo import ZoneInfo
 
 from pydantic import Field
 
+from app.core.context import ContextField
 from app.files.documents.content import Paper
 from app.language.i18n import current_language
 from app.language.times import plant_zone
 from app.views.reports.actions import KEPT_DAYS, MOST_AT_ONCE
 from app.views.reports.bundle import Bundle, BundleFormat
-from app.views.reports.request import ReportRequest, SectionName, section_names, zone_or_plants
+from app.views.reports.request import ReportRequest, SectionName, context_of, section_names, zone_or_plants
 from app.views.reports.tables import ReportJob
 from app.web.choice import PeriodBody
 from app.web.fields import LARGEST_ID, Body, Slug
 
 Keys = Annotated[list[Slug], Field(max_length=MOST_AT_ONCE)]
+
+Value = Annotated[str, Field(min_length=1, max_length=128)] | Annotated[int, Field(strict=True, ge=0, le=999_999)]
 
 
 class ReportsIn(PeriodBody):
@@ -32,7 +35,7 @@ class ReportsIn(PeriodBody):
         strict=True,
         ge=1,
         le=LARGEST_ID,
-        description="Of each only the last N readings; without any period the last 1000. A very large number means all.",
+        description="Of each only the last N readings; without period and context the last 1000. A very large number means all.",
     )
     sections: list[SectionName] = Field(
         default=[], max_length=len(SectionName), description="Only these sections; all of them where none is named."
@@ -44,6 +47,10 @@ class ReportsIn(PeriodBody):
     paper: Paper = Paper.A4
     timezone: str | None = Field(
         default=None, max_length=64, description="In which moments are written; the plant's if left out."
+    )
+    context: dict[ContextField, Value] = Field(
+        default={},
+        description="Only readings with these values in their context; without `last` and period all of them.",
     )
 
     @classmethod
@@ -60,6 +67,7 @@ class ReportsIn(PeriodBody):
             section_names(self.sections),
             self.paper,
             self.timezone or plant_zone().key,
+            context=context_of({field.value: str(value) for field, value in self.context.items()}),
         )
         return Bundle(request, self.format, self.characteristics, self.machines, current_language())
 

@@ -6,7 +6,7 @@ from datetime import UTC, datetime, timedelta
 from enum import StrEnum
 from zoneinfo import ZoneInfo
 
-from app.core.context import Chosen
+from app.core.context import Chosen, ContextField
 from app.core.period import ALWAYS, Period
 from app.core.spc import USUAL_READINGS
 from app.errors import FieldError, Invalid
@@ -115,9 +115,46 @@ def section_names(names: Sequence[str]) -> tuple[SectionName, ...]:
     return tuple(name for name in SectionName if not names or name in names)
 
 
+def context_of(said: Mapping[str, str]) -> Chosen:
+    """The context by the names of its fields, an empty one asks for nothing. Raises `Invalid`, naming every field."""
+    chosen = tuple((field, value) for field in ContextField if (value := said.get(field.value, "").strip()))
+    errors = [
+        FieldError(f"context.{field.value}", _("is no number of a nest: a whole number from 0 to 999999"))
+        for field, value in chosen
+        if field is ContextField.NEST and not (value.isascii() and value.isdigit() and len(value) <= 6)
+    ]
+    errors += [
+        FieldError(f"context.{field.value}", _("must be one line of at most 128 characters"))
+        for field, value in chosen
+        if len(value) > 128 or any(ord(sign) < 32 or ord(sign) == 127 for sign in value)
+    ]
+    errors += [
+        FieldError(
+            "context",
+            _("there is no field {name}; there are {names}").format(
+                name=repr(name[:40]), names=", ".join(ContextField)
+            ),
+        )
+        for name in said
+        if name not in set(ContextField)
+    ]
+    if errors:
+        raise Invalid(
+            "; ".join(f"{error.field}: {error.message}" for error in errors),
+            _("Correct the named fields."),
+            errors=errors,
+        )
+    return chosen
+
+
 def typed(fields: Mapping[str, str], sections: Sequence[str], context: Chosen = ()) -> ReportRequest:
     """As people type it: moments without an offset are those of the named time zone, else the plant's. Raises `Invalid`, naming every field."""
     errors: list[FieldError] = []
+    if not context:
+        try:
+            context = context_of({field.value: fields.get(f"context.{field.value}", "") for field in ContextField})
+        except Invalid as error:
+            errors += error.errors
     zone: ZoneInfo | None = None
     try:
         zone = cell_values.zone_named(fields.get("timezone", "").strip() or plant_zone().key)

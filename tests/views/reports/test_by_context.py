@@ -1,15 +1,20 @@
 """The report of one order: its readings alone, whatever was cut between them."""
 
-from io import BytesIO
+from csv import DictReader
+from io import BytesIO, StringIO
 from statistics import mean
+from typing import Any
 from urllib.parse import quote
+from zipfile import ZipFile
 
 import pytest
 from pypdf import PdfReader
 
 from tests.conftest import Server
+from tests.forked import inband
 from tests.shop import Person, Shop
 from tests.views.reports.story import facts, file, report, scatter, table
+from tests.waits import until
 
 ORDER = "A-47 „Đ“ & <b>"
 HERE = f"context.order={quote(ORDER)}"
@@ -66,3 +71,45 @@ def test_the_page_asks_for_it_and_its_files_hold_it(orders: Shop, viewer: Person
     assert 'name="context.order" value="A-47 „Đ“ &amp; &lt;b&gt;"' in page
     assert f"report.pdf?context.order={quote(ORDER).replace('%20', '+')}" in page
     assert "Order A-47 „Đ“ &amp; &lt;b&gt;, " in page
+
+
+def test_many_at_once_are_of_it_alone(orders: Shop) -> None:
+    body: dict[str, Any] = {"characteristics": [orders.characteristic], "sections": ["numbers"], "format": "csv"}
+    job = orders.call("POST", "/reports", 201, **body, context={"order": ORDER, "nest": 0})
+    until(lambda: orders.call("GET", f"/reports/{job['id']}")["state"] == "done", 120)
+    whole = ZipFile(BytesIO(orders.admin.get(f"/api/v1/reports/{job['id']}/file").content))
+    text = whole.read(f"report-{orders.characteristic}.csv").decode("utf-8-sig")
+    values = {(row["section"], row["key"]): row["value"] for row in DictReader(StringIO(text))}
+    assert values["numbers", "count"] == "6"
+    assert ORDER in values.values()
+
+
+@pytest.mark.parametrize(
+    ("context", "field"),
+    [({"nest": "second"}, "context.nest"), ({"order": "A\nB"}, "context.order"), ({"pallet": "3"}, "context.pallet")],
+)
+def test_many_at_once_of_a_context_that_there_is_not_are_refused(orders: Shop, context: object, field: str) -> None:
+    body: dict[str, Any] = {"characteristics": [orders.characteristic]}
+    refusal = orders.call("POST", "/reports", 422, **body, context=context)
+    assert field in str(refusal["errors"])
+
+
+def test_the_page_of_many_asks_for_it_and_says_it(orders: Shop, viewer: Person) -> None:
+    fields = {"characteristic": orders.characteristic, "section": "numbers", "format": "csv"}
+    viewer.post("/reports", **fields, **{"context.order": ORDER})
+    assert "Order A-47 „Đ“ &amp; &lt;b&gt;" in viewer.open("/reports")
+
+
+def test_a_command_asks_for_it(orders: Shop) -> None:
+    asked = ("report", orders.characteristic, "--format", "csv", "--section", "numbers")
+    database = {"INBAND_DATABASE_URL": orders.server.database.dsn}
+    done = inband(*asked, "--context", f"order={ORDER}", "--context", "nest=0", **database)
+    assert done.returncode == 0, done.stderr
+    values = {
+        (row["section"], row["key"]): row["value"] for row in DictReader(StringIO(done.stdout.removeprefix("\ufeff")))
+    }
+    assert values["numbers", "count"] == "6"
+    for wrong, reason in (("order", "order=A-4711"), ("pallet=3", "pallet"), ("nest=b", "nest")):
+        refused = inband(*asked, "--context", wrong, **database)
+        assert refused.returncode
+        assert reason in refused.stderr
