@@ -1,6 +1,7 @@
 """Settings of an installation. Every field is also an environment variable: ``port`` is ``INBAND_PORT``."""
 
 import re
+import ssl
 from collections.abc import Callable
 from datetime import date
 from ipaddress import ip_address, ip_network
@@ -106,6 +107,14 @@ def _each(text: str, kind: Callable[[str], object], wrong: str) -> str:
 
 def _networks(text: str) -> str:
     return _each(text, ip_network, "network; name it like 192.168.10.0/24")
+
+
+def _authorities(path: Path) -> Path:
+    try:
+        ssl.create_default_context(cafile=str(path))
+    except OSError as error:
+        raise ValueError(f"holds no certificate of an authority (PEM): {error}") from None
+    return path
 
 
 def _dates(text: str) -> str:
@@ -258,6 +267,11 @@ class Settings(BaseSettings):
     mail_password: str | None = Field(default=None, repr=False, description="Its password.")
     mail_from: Annotated[str, Field(pattern=r"^[^@\s<>]+@[^@\s<>]+$")] | None = Field(
         default=None, description="Sender of the mails; inband@ and the name of the mail server if left out."
+    )
+    ca_file: Annotated[Path, AfterValidator(_authorities)] | None = Field(
+        default=None,
+        description="File with the certificates (PEM) of authorities of your own, trusted beside those of the computer: for the mail "
+        "server and webhooks.",
     )
     webhook_networks: Annotated[str, AfterValidator(_networks)] = Field(
         default="",

@@ -8,6 +8,7 @@ import smtplib
 import ssl
 import threading
 import time
+from base64 import b64encode
 from collections.abc import Callable
 from contextlib import suppress
 from contextvars import copy_context
@@ -16,6 +17,7 @@ from datetime import datetime
 from email.message import EmailMessage
 from email.utils import formatdate
 from functools import cache
+from pathlib import Path
 from typing import Any, NamedTuple, TypeVar
 
 import httpx
@@ -31,6 +33,8 @@ LIMIT = 15.0
 STEP = 10.0
 """Seconds for one step of it: to connect, or to get the next bytes."""
 LONGEST_ANSWER = 300
+UNKNOWN_AUTHORITY = frozenset({18, 19, 20, 21})
+"""Codes of OpenSSL for a certificate of which nobody knows who signed it."""
 Result = TypeVar("Result")
 
 
@@ -92,8 +96,8 @@ async def deliver(job: Job, settings: Settings) -> Answer:
     except httpx.ReadTimeout:
         return Answer(delivered=False, text=_("no answer within {n} s").format(n=f"{STEP:g}"), perhaps=True)
     except (OSError, smtplib.SMTPException, httpx.HTTPError, httpx.InvalidURL, ValueError) as error:
-        text = _short(f"{type(error).__name__}: {error}" if str(error) else type(error).__name__)
-        return Answer(delivered=False, text=text)
+        text = f"{type(error).__name__}: {error}" if str(error) else type(error).__name__
+        return Answer(delivered=False, text=_short(_certificate_refused(error) or text))
 
 
 _MAILS, _APPRISE, _NAMES = (threading.BoundedSemaphore(32) for _each in range(3))
@@ -142,15 +146,12 @@ def _by_mail(job: Job, settings: Settings) -> str:
     mail.set_content(job.message.text)
     if job.message.picture is not None:
         mail.add_attachment(job.message.picture, "image", "png", filename="readings.png", disposition="inline")
-    if settings.mail_security == "tls":
-        server: smtplib.SMTP = smtplib.SMTP_SSL(host, int(port or 465), timeout=STEP, context=_tls())
-    else:
-        server = smtplib.SMTP(host, int(port or (587 if settings.mail_security == "starttls" else 25)), timeout=STEP)
+    server = _connected(host, port, settings)
     try:
         if settings.mail_security == "starttls":
-            server.starttls(context=_tls())
+            server.starttls(context=_tls(settings.ca_file))
         if settings.mail_user:
-            server.login(settings.mail_user, settings.mail_password or "")
+            _sign_in(server, settings.mail_user, settings.mail_password or "")
         try:
             _wait(server, LIMIT)  # some look through a mail for long before they take it
             server.send_message(mail)
@@ -164,6 +165,42 @@ def _by_mail(job: Job, settings: Settings) -> str:
     finally:
         server.close()
     return _("The mail server has taken it.")
+
+
+def _connected(host: str, port: str, settings: Settings) -> smtplib.SMTP:
+    """The mail server, after its greeting. Raises `Refused` where it speaks first with encryption, or without, against the setting."""
+    try:
+        if settings.mail_security == "tls":
+            return smtplib.SMTP_SSL(host, int(port or 465), timeout=STEP, context=_tls(settings.ca_file))
+        return smtplib.SMTP(host, int(port or (587 if settings.mail_security == "starttls" else 25)), timeout=STEP)
+    except ssl.SSLCertVerificationError:
+        raise
+    except ssl.SSLError as error:
+        reason = _("{server} is not encrypted from the first byte ({error}): INBAND_MAIL_SECURITY=starttls?")
+        raise Refused(reason.format(server=settings.mail_server, error=error.reason)) from None
+    except smtplib.SMTPServerDisconnected:
+        reason = _("{server} did not greet: is it encrypted from the first byte, INBAND_MAIL_SECURITY=tls?")
+        raise Refused(reason.format(server=settings.mail_server)) from None
+
+
+def _sign_in(server: smtplib.SMTP, user: str, password: str) -> None:
+    """Sign in, with letters beyond ASCII too, which `login` cannot send. Raises `SMTPAuthenticationError`."""
+    if f"{user}{password}".isascii():
+        server.login(user, password)
+        return
+    server.ehlo_or_helo_if_needed()
+    if "PLAIN" in server.esmtp_features.get("auth", "").upper().split():
+        said = server.docmd("AUTH", f"PLAIN {_base64(f'{chr(0)}{user}{chr(0)}{password}')}")
+    else:
+        said = server.docmd("AUTH", f"LOGIN {_base64(user)}")
+        if said[0] == 334:
+            said = server.docmd(_base64(password))
+    if said[0] != 235:
+        raise smtplib.SMTPAuthenticationError(*said)
+
+
+def _base64(text: str) -> str:
+    return b64encode(text.encode()).decode()
 
 
 def _wait(server: smtplib.SMTP, seconds: float) -> None:
@@ -183,8 +220,24 @@ def _said(error: smtplib.SMTPResponseException | smtplib.SMTPRecipientsRefused) 
 
 
 @cache
-def _tls() -> ssl.SSLContext:
-    return ssl.create_default_context()
+def _tls(ca_file: Path | None) -> ssl.SSLContext:
+    """Trust in the authorities of this computer, and in those of the file."""
+    context = ssl.create_default_context()
+    if ca_file is not None:
+        context.load_verify_locations(ca_file)
+    return context
+
+
+def _certificate_refused(error: BaseException | None) -> str | None:
+    """The reason why a certificate was refused, if that is the cause of the error."""
+    while error is not None and not isinstance(error, ssl.SSLCertVerificationError):
+        error = error.__cause__ or error.__context__
+    if error is None:
+        return None
+    text = _("certificate refused: {reason}").format(reason=error.verify_message.rstrip("."))
+    if error.verify_code in UNKNOWN_AUTHORITY:
+        text += "; " + _("if an authority of your own has signed it, name that in INBAND_CA_FILE")
+    return text
 
 
 # --- webhooks
@@ -206,7 +259,9 @@ async def _to_webhook(job: Job, settings: Settings) -> Answer:
         "X-Inband-Timestamp": timestamp,
         "X-Inband-Signature": f"sha256={signature(job.secret or '', timestamp, body)}",
     }
-    async with httpx.AsyncClient(verify=_tls(), timeout=STEP, trust_env=False, follow_redirects=False) as client:
+    async with httpx.AsyncClient(
+        verify=_tls(settings.ca_file), timeout=STEP, trust_env=False, follow_redirects=False
+    ) as client:
         request = client.build_request("POST", job.address, content=body, headers=headers)
         _connect_to(request, place)
         answer = await client.send(request, stream=True)

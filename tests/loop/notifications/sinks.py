@@ -27,10 +27,12 @@ from app.loop.notifications.means import signature
 class Mails:
     """A mail server. It takes everything, but for addresses that begin with what it does: refused, mute, rude."""
 
-    def __init__(self, context: SSLContext | None = None) -> None:
+    def __init__(self, context: SSLContext | None = None, *, first: bool = False, **more: Any) -> None:
+        """first: encrypted from the first byte. more: as aiosmtpd takes it."""
         self.mails: list[Message] = []
         self.encrypted: list[bool] = []
-        more: dict[str, Any] = {"tls_context": context, "require_starttls": True} if context else {}
+        if context:
+            more |= {"ssl_context": context} if first else {"tls_context": context, "require_starttls": True}
         self.controller = Controller(self, hostname="127.0.0.1", port=0, ready_timeout=60, **more)
 
     async def handle_RCPT(self, server: SMTP, session: Any, envelope: Any, address: str, options: Any) -> str:  # noqa: N802
@@ -59,11 +61,11 @@ class Mails:
 
 
 @contextmanager
-def mail_server(context: SSLContext | None = None) -> Iterator[tuple[Mails, str]]:
+def mail_server(context: SSLContext | None = None, **more: Any) -> Iterator[tuple[Mails, str]]:
     """A mail server, and its address."""
     from tests.conftest import free_port
 
-    made = Mails(context)
+    made = Mails(context, **more)
     made.controller.port = free_port()
     made.controller.start()
     try:

@@ -2,17 +2,16 @@
 
 import re
 import socket
-import ssl
 import sys
 from collections.abc import Iterator
 from datetime import UTC, datetime, timedelta
-from functools import partial
 from io import BytesIO
 from pathlib import Path
 from types import ModuleType
 from typing import Any
 
 import pytest
+from aiosmtpd.smtp import AuthResult
 from PIL import Image, ImageColor
 from sqlalchemy import select, text
 from sqlalchemy.orm import Session
@@ -529,16 +528,52 @@ class TestEncryption:
         assert "STARTTLS" in answer.text
         assert len(mails[0].mails) == before
 
-    def test_its_certificate_has_to_be_known(self, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def test_its_certificate_has_to_be_known(self, tmp_path: Path) -> None:
         pem = certificate(tmp_path)
         with mail_server(secure(pem)) as (sink, server):
             refused = mail(server)
-            assert "CERTIFICATE_VERIFY_FAILED" in refused.text
+            assert refused.text.startswith("certificate refused: ")
+            assert "INBAND_CA_FILE" in refused.text
             assert sink.mails == []
-            monkeypatch.setattr(means, "_tls", partial(ssl.create_default_context, cafile=str(pem)))
-            assert mail(server).delivered
+            assert mail(server, ca_file=pem).delivered
         assert sink.encrypted == [True]
         assert sink.mails[0]["Subject"] == "Tool worn"
+
+    def test_from_the_first_byte(self, tmp_path: Path) -> None:
+        pem = certificate(tmp_path)
+        with mail_server(secure(pem), first=True) as (sink, server):
+            assert mail(server, mail_security="tls", ca_file=pem).delivered
+            assert "INBAND_CA_FILE" in mail(server, mail_security="tls").text
+        assert len(sink.mails) == 1
+
+    def test_the_wrong_kind_says_which_setting_it_is(
+        self, tmp_path: Path, mails: tuple[Mails, str], monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        monkeypatch.setattr(means, "STEP", 0.3)
+        assert "INBAND_MAIL_SECURITY=starttls" in mail(mails[1], mail_security="tls").text
+        with mail_server(secure(certificate(tmp_path)), first=True) as (_sink, server):
+            assert "INBAND_MAIL_SECURITY=tls" in mail(server).text
+
+    def test_a_file_without_a_certificate_is_refused_at_the_start(self, tmp_path: Path) -> None:
+        (tmp_path / "ca.pem").write_text("no certificate")
+        with pytest.raises(ValueError, match="no certificate of an authority"):
+            Settings(ca_file=tmp_path / "ca.pem")
+
+    @pytest.mark.parametrize("way", ["PLAIN", "LOGIN"])
+    @pytest.mark.parametrize("password", ["secret", "šifra ß"])
+    def test_it_signs_in(self, tmp_path: Path, password: str, way: str) -> None:
+        def knows(_server: Any, _session: Any, _envelope: Any, _mechanism: str, data: Any) -> AuthResult:
+            right = (data.login, data.password) == (b"anna", password.encode())
+            return AuthResult(success=right, handled=False)
+
+        pem = certificate(tmp_path)
+        others = [other for other in ("PLAIN", "LOGIN") if other != way]
+        door: dict[str, Any] = {"authenticator": knows, "auth_required": True, "auth_exclude_mechanism": others}
+        with mail_server(secure(pem), **door) as (sink, server):
+            assert mail(server, ca_file=pem, mail_user="anna", mail_password=password).delivered
+            refused = mail(server, ca_file=pem, mail_user="anna", mail_password=f"not {password}")
+            assert refused.text.startswith("535 ")
+        assert len(sink.mails) == 1
 
     def test_without_a_mail_server_it_says_what_to_set(self) -> None:
         job = Job(1, 1, "test", "mail", "anna@example.com", None, Message("Test", "Text\n"))
