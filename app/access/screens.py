@@ -67,14 +67,18 @@ def screens(session: Session, after: int = 0, limit: int = 1000) -> Sequence[Wal
     return session.scalars(query.order_by(WallScreen.id).limit(limit)).all()
 
 
+def screen_of(session: Session, key: str) -> int | None:
+    """Number of the wall screen with this key; None for one that is not known or was revoked."""
+    found = select(WallScreen.id).where(WallScreen.secret_hash == digest(key), WallScreen.revoked_at.is_(None))
+    return session.scalar(found)
+
+
 def screen_at(request: Request, session: Session) -> int | None:
     """Number of the wall screen that calls, noted as used; None for a key that is not known or was revoked.
 
     Raises `NotSignedIn` for another way of authorization.
     """
-    key = digest(bearer(request) or "")
-    found = select(WallScreen.id).where(WallScreen.secret_hash == key, WallScreen.revoked_at.is_(None))
-    number = session.scalar(found)
+    number = screen_of(session, bearer(request) or "")
     if number is not None:
         session.execute(_USED, {"id": number})
     return number

@@ -1,7 +1,7 @@
-"""People of the demonstration plant, and the key by which the plant sets itself up.
+"""People of the demonstration plant, its wall screen, and the key by which the plant sets itself up.
 
-Passwords are made up for each installation and kept, readable by its owner alone, beside the data they open, so that a
-second start prints the same ones.
+Passwords and the key of the wall screen are made up for each installation and kept, readable by its owner alone, beside the data
+they open, so that a second start prints the same ones.
 """
 
 import json
@@ -21,6 +21,7 @@ from app.simulators.demo import plant
 
 PEOPLE = {"engineer": "engineer", "operator": "operator", "admin": "admin"}  # name and role
 ACTOR = "inband demo"
+WALL = "wall screen"
 LETTERS = "abcdefghijkmnpqrstuvwxyz23456789"  # none that look alike
 
 
@@ -35,7 +36,7 @@ def sign_ins(database: Database, settings: Settings) -> dict[str, str]:
     Raises `InbandError` on a database that holds somebody's own plant.
     """
     path = file_of(settings)
-    known: dict[str, str] = json.loads(path.read_text()) if path.exists() else {}
+    known = _kept(path)
     passwords: dict[str, str] = {}
     with database.begin() as session:
         _refuse_a_real_plant(session, settings, path)
@@ -45,8 +46,9 @@ def sign_ins(database: Database, settings: Settings) -> dict[str, str]:
                 actions.add_person(session, name=name, role=role, password=passwords[name], actor=ACTOR)
             elif name in known:
                 passwords[name] = known[name]
-        if passwords != known:
-            _keep(path, passwords)
+        kept = {name: known[name] for name in known.keys() - PEOPLE} | passwords
+        if kept != known:
+            _keep(path, kept)
     return passwords
 
 
@@ -60,12 +62,14 @@ def plant_key(database: Database) -> str:
 
 
 def wall_link(database: Database, settings: Settings) -> str:
-    """The link of a wall screen for this run; that of the run before is revoked."""
+    """The link of a wall screen: the same at each start, so that one which is open goes on, until somebody revokes it."""
+    path = file_of(settings)
+    known = _kept(path)
     with database.begin() as session:
-        for screen in screens.screens(session):
-            if screen.name == ACTOR:
-                screens.revoke_screen(session, screen.id, ACTOR)
-        return f"{settings.address}/wall#{screens.add_screen(session, ACTOR, ACTOR).key}"
+        if screens.screen_of(session, known.get(WALL, "")) is None:
+            known[WALL] = screens.add_screen(session, ACTOR, ACTOR).key
+            _keep(path, known)
+    return f"{settings.address}/wall#{known[WALL]}"
 
 
 def _refuse_a_real_plant(session: Session, settings: Settings, path: Path) -> None:
@@ -88,9 +92,14 @@ def _password() -> str:
     return "-".join("".join(secrets.choice(LETTERS) for _letter in range(4)) for _group in range(3))
 
 
-def _keep(path: Path, passwords: dict[str, str]) -> None:
+def _kept(path: Path) -> dict[str, str]:
+    kept: dict[str, str] = json.loads(path.read_text()) if path.exists() else {}
+    return kept
+
+
+def _keep(path: Path, secrets_now: dict[str, str]) -> None:
     path.parent.mkdir(parents=True, exist_ok=True)
     draft = path.with_suffix(".new")
     with os.fdopen(os.open(draft, os.O_WRONLY | os.O_CREAT | os.O_TRUNC, 0o600), "w", encoding="utf-8") as file:
-        json.dump(passwords, file)
+        json.dump(secrets_now, file)
     draft.replace(path)

@@ -34,7 +34,7 @@ class WallScreen extends HTMLElement {
         this.now.replaceChildren();
         this.say("refused", this.dataset.refused);
         pause = REFUSED;
-      } else if (answer.ok) this.take(await answer.text());
+      } else if (answer.ok) await this.take(await answer.text());
       else this.lose();
     } catch {
       this.lose();
@@ -45,11 +45,17 @@ class WallScreen extends HTMLElement {
   take(text) {
     const made = new DOMParser().parseFromString(text, "text/html").querySelector(".wall-page");
     if (!made) return this.lose();
-    if (made.dataset.version !== this.getAttribute("version")) return location.reload();
+    if (made.dataset.version !== this.getAttribute("version")) return this.renew();
     this.now.replaceChildren(made);
     this.seen = Date.now();
     this.clock = made.querySelector("time")?.textContent;
     this.say("live", "");
+  }
+
+  // Never before the server has answered: a browser's own page of what it could not load would hang there for good.
+  async renew() {
+    const answer = await fetch(location.pathname, { cache: "no-store", credentials: "omit", signal: AbortSignal.timeout(PATIENCE) });
+    if (answer.ok) location.reload();
   }
 
   lose() {

@@ -15,6 +15,7 @@ from typing import Any
 
 import pytest
 
+from app.access import screens
 from app.db.engine import Database
 from app.errors import InbandError
 from app.settings import Settings
@@ -208,6 +209,18 @@ def test_passwords_are_made_up_kept_for_the_owner_alone_and_the_same_at_the_next
     assert stat.S_IMODE(file.stat().st_mode) == 0o600
     assert json.loads(file.read_text()) == first
     assert people.sign_ins(database, settings) == first
+
+
+def test_a_wall_screen_that_is_open_goes_on_at_the_next_start(database: Database, tmp_path: Path) -> None:
+    settings = Settings(data_dir=tmp_path / "plant", database_url=database.dsn)
+    people.sign_ins(database, settings)
+    link = people.wall_link(database, settings)
+    people.sign_ins(database, settings)
+    assert people.wall_link(database, settings) == link
+    with database.begin() as session:
+        (screen,) = screens.screens(session)
+        screens.revoke_screen(session, screen.id, "anna")
+    assert people.wall_link(database, settings) != link
 
 
 def test_the_demonstration_is_not_mixed_into_somebodys_plant(server: Server, tmp_path: Path) -> None:

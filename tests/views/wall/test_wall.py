@@ -113,6 +113,32 @@ def stranger(browser: Browser) -> Iterator[BrowserContext]:
     context.close()
 
 
+def test_it_is_never_blank(stranger: BrowserContext, common_shop: Shop, server: Server) -> None:
+    screen = common_shop.call("POST", "/wall-screens", 201, name=unique("Hall"))
+    page = stranger.new_page()
+    page.route("**/wall/now", lambda _route: None)  # a server that is starting
+    page.goto(f"{server.url}/wall#{screen['url'].partition('#')[2]}")
+    expect(page.locator(".wall-trouble")).to_contain_text("Connecting")
+
+
+def test_it_loads_itself_again_after_an_update_only_where_that_answers(
+    stranger: BrowserContext, common_shop: Shop, server: Server
+) -> None:
+    screen = common_shop.call("POST", "/wall-screens", 201, name=unique("Hall"))
+    page = stranger.new_page()
+    page.clock.install()
+    page.goto(f"{server.url}/wall#{screen['url'].partition('#')[2]}")
+    expect(page.locator(".wall-machines li").first).to_be_visible()
+    page.locator("wall-screen").evaluate("each => each.setAttribute('version', '0.0.1')")
+    page.route("**/wall", lambda route: route.abort())
+    page.clock.fast_forward(6_000)
+    expect(page.locator(".wall-trouble")).to_contain_text("No connection since")
+    page.unroute("**/wall")
+    page.clock.fast_forward(6_000)
+    expect(page.locator("wall-screen")).not_to_have_attribute("version", "0.0.1")
+    expect(page.locator(".wall-machines li").first).to_be_visible()
+
+
 def test_it_says_since_when_it_is_old_goes_on_and_ends_when_revoked(
     stranger: BrowserContext, common_shop: Shop, server: Server
 ) -> None:
