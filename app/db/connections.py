@@ -13,6 +13,7 @@ PostgreSQL reports the end of a wait that is cancelled as success. The connectio
 import asyncio
 import contextlib
 import logging
+import select
 import threading
 import time
 from collections.abc import Generator
@@ -260,6 +261,15 @@ class _Watched:
 
 class WatchedConnection(_Watched, psycopg.Connection[Any]):
     """A connection for threads."""
+
+    def seems_open(self) -> bool:
+        """Tell if nothing has come in since the last answer, as the server's end of it would. False where that cannot be seen."""
+        of = self.connections
+        if self.closed or not hasattr(select, "poll") or (of is not None and (of.silent or of.age != self.age)):
+            return False
+        poll = select.poll()
+        poll.register(self.pgconn.socket, select.POLLIN)
+        return not poll.poll(0)
 
     def wait(self, gen: PQGen[RV], interval: float = LOOK, timeout: float | None = None) -> RV:
         """Wait as psycopg does, as long as the database is heard."""

@@ -3,10 +3,12 @@
 import logging
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from time import perf_counter
+from time import monotonic, perf_counter
 from typing import TYPE_CHECKING, Any, cast
 
-from sqlalchemy import PoolProxiedConnection, QueuePool, create_engine
+from psycopg import OperationalError
+from sqlalchemy import PoolProxiedConnection, QueuePool, create_engine, event
+from sqlalchemy.exc import InvalidatePoolError
 from sqlalchemy.orm import Session, sessionmaker
 from sqlalchemy.pool import ConnectionPoolEntry
 
@@ -15,6 +17,8 @@ from app.db.connections import LIMITS, Connections, plain_url
 if TYPE_CHECKING:
     from psycopg import Connection
 
+LATELY = 1.0
+"""Seconds after its last use in which a connection is taken without a question, unless the server has ended it."""
 
 logging.getLogger(f"{__name__}.Pool").setLevel(logging.WARNING)  # SQLAlchemy names what it logs of a pool by its class
 
@@ -31,6 +35,7 @@ class Pool(QueuePool):
         super().dispose()
 
     def _do_return_conn(self, record: ConnectionPoolEntry) -> None:
+        record.info["used_at"] = monotonic()
         if self._ended:
             record.close()
         super()._do_return_conn(record)
@@ -77,8 +82,8 @@ class Database:
             poolclass=Pool,
             pool_size=pool_size,
             max_overflow=pool_size if overflow is None else overflow,
-            pool_pre_ping=True,  # a restarted database costs one retry here, not one failed page per connection
         )
+        event.listen(self.engine, "checkout", self._try_out)
         cast("Pool", self.engine.pool).waited = waited
         self.sessions = sessionmaker(self.engine, expire_on_commit=False, info={"database": self})
 
@@ -94,6 +99,19 @@ class Database:
 
     def close(self) -> None:
         self.engine.dispose()
+
+    def _try_out(self, connection: Any, record: ConnectionPoolEntry, _proxy: object) -> None:
+        """Ask before a connection is taken: a restarted database costs one retry here, not one failed page per connection.
+
+        Of one that was used a moment ago it is enough that nothing came in since, as the end would. A new one is not asked.
+        """
+        used_at = record.info.get("used_at")
+        if used_at is None or (monotonic() - used_at < LATELY and connection.seems_open()):
+            return
+        try:
+            self.engine.dialect.do_ping(connection)
+        except OperationalError as error:
+            raise InvalidatePoolError from error
 
 
 def driver_connection(session: Session) -> "Connection[Any]":

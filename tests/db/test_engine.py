@@ -1,10 +1,12 @@
 from datetime import UTC, datetime, timedelta, timezone
+from typing import Any
 
 import psycopg
 import pytest
 from sqlalchemy import text
 from sqlalchemy.exc import StatementError
 
+from app.db import engine
 from app.db.connections import parameters_of
 from app.db.engine import Database
 from app.db.types import UtcTime
@@ -53,10 +55,31 @@ def test_a_connection_that_broke_is_replaced(database: Database) -> None:
         session.execute(text("SELECT 1"))
     with psycopg.connect(database.dsn, autocommit=True) as other:
         other.execute(
-            "SELECT pg_terminate_backend(pid) FROM pg_stat_activity WHERE pid <> pg_backend_pid() AND datname = current_database()"
+            "SELECT pg_terminate_backend(pid, 60000) FROM pg_stat_activity WHERE pid <> pg_backend_pid() AND datname = current_database()"
         )
     with database.begin() as session:
         assert session.scalar(text("SELECT 1")) == 1
+
+
+def test_a_connection_used_a_moment_ago_is_taken_without_a_question(
+    database: Database, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    asked: list[object] = []
+    ask = database.engine.dialect.do_ping
+
+    def counted(connection: Any) -> bool:
+        asked.append(connection)
+        return ask(connection)
+
+    monkeypatch.setattr(database.engine.dialect, "do_ping", counted)
+    for _time in range(3):
+        with database.begin() as session:
+            session.execute(text("SELECT 1"))
+    assert not asked
+    monkeypatch.setattr(engine, "LATELY", 0)
+    with database.begin() as session:
+        session.execute(text("SELECT 1"))
+    assert len(asked) == 1
 
 
 def test_a_connection_given_back_after_the_end_is_closed(database: Database) -> None:
