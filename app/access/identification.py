@@ -19,7 +19,7 @@ from sqlalchemy.orm import Session
 
 from app.access import names, queries
 from app.access.actions import check_password
-from app.access.attempts import Wait, count_once, note_attempt, remember, strike_out, strike_out_one
+from app.access.attempts import Wait, count_once, note_attempt, refuse_again, remember, strike_out, strike_out_one
 from app.access.audit.actions import Acting, record
 from app.access.callers import Caller, Role
 from app.access.devices import Device
@@ -78,11 +78,12 @@ def identify(database: Database, device: Device, shown: Shown) -> Caller:
 def _by_pin(database: Database, device: Device, shown: Shown) -> Person | None:
     """Return who has this name and PIN. Raises `TooManyRequests` while it is locked."""
     name = names.as_stored(shown.name.replace("\0", "")[:400].encode(errors="replace").decode())
-    counted_as, place = name.casefold()[:200], _place(device)
+    counted_as, place = guess = name.casefold()[:200], _place(device)
+    refuse_again(database, *guess)
     with database.begin() as session:
         person = queries.person_named(session, name)
         known = person is not None and queries.known_place(session, person.id, place)
-        note_attempt(session, counted_as, place, COUNTED, partial(_refuse_pin, known=known))
+        note_attempt(session, counted_as, place, COUNTED, partial(_refuse_pin, known=known), guess)
     usable = person is not None and person.disabled_at is None
     right = matches(shown.pin[: LONGEST_PIN + 1], person.pin_hash if person is not None and usable else None)
     if person is None or not right:
@@ -96,8 +97,9 @@ def _by_pin(database: Database, device: Device, shown: Shown) -> Person | None:
 def _by_badge(database: Database, device: Device, code: str) -> Person | None:
     """Return whose badge this is. Raises `TooManyRequests` while badges are locked."""
     place = f"{_place(device)} badges"
+    refuse_again(database, place)
     with database.begin() as session:
-        attempt = note_attempt(session, place, place, COUNTED, _refuse_badge)
+        attempt = note_attempt(session, place, place, COUNTED, _refuse_badge, (place,))
     code_hash = looked_up(_badge_code(code)[: LONGEST_BADGE + 1])
     with database.begin() as session:
         person = session.scalars(

@@ -13,7 +13,7 @@ from app.access.identification import LONGEST_PIN, SHORTEST_PIN, remove_badges, 
 from app.access.passwords import SHORTEST
 from app.access.sign_in import SignedIn, begin_session, sign_in, sign_out
 from app.db.engine import Database
-from app.errors import InbandError, Invalid, NotAllowed
+from app.errors import InbandError, Invalid, NotAllowed, TooManyRequests
 from app.language.i18n import _
 from app.web.deps import IN_TURN, SESSION_COOKIE, FormDep, SessionDep, SettingsDep, from_this_site
 from app.web.forms import by_field
@@ -65,9 +65,12 @@ def send_sign_in(request: Request, form: FormDep, settings: SettingsDep) -> Resp
     try:
         signed_in = sign_in(database, name, form.get("password", ""), address, settings.session_hours, device)
     except InbandError as error:
-        with database.begin() as session:  # what is no name may be a password, typed in the wrong place
-            known = queries.person_named(session, name.strip()) if name.isprintable() else None
-        log.warning("sign-in of %s from %s refused", known.name if known else "an unknown name", address)
+        if isinstance(error, TooManyRequests):
+            log.warning("sign-in from %s refused: too many have failed", address)
+        else:
+            with database.begin() as session:  # what is no name may be a password, typed in the wrong place
+                known = queries.person_named(session, name.strip()) if name.isprintable() else None
+            log.warning("sign-in of %s from %s refused", known.name if known else "an unknown name", address)
         return page(
             request,
             "access/sign_in.html",

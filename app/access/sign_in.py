@@ -14,7 +14,7 @@ from sqlalchemy import delete, func
 from sqlalchemy.orm import Session
 
 from app.access import names, queries
-from app.access.attempts import Wait, note_attempt, remember, strike_out
+from app.access.attempts import Wait, note_attempt, refuse_again, remember, strike_out
 from app.access.audit.actions import Acting, record
 from app.access.new_keys import digest
 from app.access.passwords import LONGEST, matches
@@ -57,12 +57,14 @@ def sign_in(database: Database, name: str, password: str, address: str, hours: i
     name = _typed(name)
     place, here = _place(address), f"device {digest(device).hex()}"
     counted_as = names.as_stored(name).casefold()[:200]
+    guess = (counted_as, place, here)
+    refuse_again(database, *guess)
     with database.begin() as session:
         person = _person(session, name)
         known_here = person is not None and device != "" and queries.known_place(session, person.id, here)
         counted_at = here if known_here else place
         known = known_here or (person is not None and queries.known_place(session, person.id, place))
-        note_attempt(session, counted_as, counted_at, COUNTED, partial(_refuse, known=known))
+        note_attempt(session, counted_as, counted_at, COUNTED, partial(_refuse, known=known), guess)
     usable = person is not None and person.disabled_at is None
     right = matches(password[: LONGEST + 1], person.password_hash if person is not None and usable else None)
     if not right or person is None:

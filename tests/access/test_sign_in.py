@@ -8,9 +8,9 @@ import httpx
 import psycopg
 import pytest
 from playwright.sync_api import Page, expect
-from sqlalchemy import func, update
+from sqlalchemy import delete, func, update
 
-from app.access import actions, passwords
+from app.access import actions, attempts, passwords
 from app.access.new_keys import digest
 from app.access.queries import still_granted
 from app.access.sign_in import SignInRefused, sign_in
@@ -186,6 +186,21 @@ class TestSlowingDown:
         assert [self.refused(database, "Ana") for _attempt in range(5)] == [None] * 5
         assert (self.refused(database, "ANA", PASSWORD) or 0) > 0, "the right password waits too"
         assert self.refused(database, "Ana", PASSWORD, "10.0.0.2") is None, "not from elsewhere"
+
+    def test_who_must_wait_is_refused_for_a_second_without_asking_the_database(
+        self, database: Database, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        self.add(database)
+        wait = [self.refused(database, "Ana") for _attempt in range(6)][-1]
+        with monkeypatch.context() as unreachable:
+            unreachable.setattr(Database, "begin", None)
+            assert self.refused(database, "ana", PASSWORD) == wait
+            with pytest.raises(TypeError):
+                self.refused(database, "Ana", PASSWORD, "10.0.0.2")
+        with database.begin() as session:
+            session.execute(delete(LoginFailure))
+        monkeypatch.setattr(attempts, "BELIEVED", 0)
+        assert sign_in(database, "Ana", PASSWORD, "10.0.0.1", 12).token
 
     def test_a_right_password_forgets_the_failures(self, database: Database) -> None:
         self.add(database)
