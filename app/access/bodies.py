@@ -6,6 +6,7 @@ keeps nothing waiting but itself: it is complete before a route begins, which ta
 
 import asyncio
 from collections.abc import Iterable
+from http import HTTPStatus
 from typing import NamedTuple
 from urllib.parse import unquote_plus
 from weakref import WeakValueDictionary
@@ -32,6 +33,8 @@ PIECE = 8000
 MOST_ESCAPED = 50_000
 """Bytes of one field of a form that do not stand for themselves: all of it is made a text in one turn, some 15 ms. Pages whose
 fields take longer texts send their form as multipart, in which everything stands for itself."""
+HELD_BACK = 0.3
+"""Seconds that anyone who has guessed too often waits for the refusal."""
 NOBODY = "nobody"
 _PLAIN = bytes(set(range(128)) - {ord("%")})
 
@@ -48,7 +51,7 @@ class BodyLimit:
 
     Forms of one device or of one unknown address are answered one after the other, and so are all requests that are refused because
     nobody is known to send them: a hundred that come at once are a hundred turns of the event loop with readings in between. A guess
-    takes as much processor as ten readings.
+    takes as much processor as ten readings, so the answer to one too many is held back; its turn ends before.
     """
 
     def __init__(self, app: ASGIApp, routes: Iterable[BaseRoute]) -> None:
@@ -78,9 +81,21 @@ class BodyLimit:
         if not turn:
             await self.app(scope, receive, send)
             return
+        late: list[Message] = []
+
+        async def send_in_time(message: Message) -> None:
+            if late or message.get("status") == HTTPStatus.TOO_MANY_REQUESTS:
+                late.append(message)
+            else:
+                await send(message)
+
         async with self._turns.setdefault(turn, asyncio.Lock()):
             await asyncio.sleep(0)  # others of this place wait now, whatever the application does at once
-            await self.app(scope, receive, send)
+            await self.app(scope, receive, send_in_time)
+        if late:
+            await asyncio.sleep(HELD_BACK)
+        for message in late:
+            await send(message)
 
     def _taken(self, scope: Scope) -> Takes:
         path, method = scope["path"], scope["method"]

@@ -9,16 +9,18 @@ from typing import Any, NamedTuple
 
 import pytest
 from fastapi.routing import APIRoute
+from starlette.types import Message, Receive, Scope, Send
 
 from app import HOUSE
 from app.access import bodies, devices
 from app.main import ROUTERS
 from app.web import json_bodies
 from app.web.deps import SAFE_METHODS
-from app.web.limits import FEW, MEGABYTE
+from app.web.limits import FEW, MEGABYTE, Takes
 from tests.access.pieces import PIECE, arrive, send
 from tests.conftest import NewDatabase, drop_database
 from tests.in_process import Direct, InProcess, in_process
+from tests.loops import run
 from tests.shop import Person, Shop
 
 JSON, FORM, FILE = "application/json", "application/x-www-form-urlencoded", "multipart/form-data; boundary=b"
@@ -107,6 +109,46 @@ def test_of_strangers_who_come_at_once_each_has_a_turn_of_the_event_loop(server:
     turns = direct.portal.call(all_at_once)
     assert max(turns) == 1
     assert finished == [401] * 20
+
+
+def test_nobody_waits_while_the_answer_to_one_guess_too_many_is_held_back(monkeypatch: pytest.MonkeyPatch) -> None:
+    answered: list[int] = []
+    held_back = asyncio.Event()
+
+    async def application(scope: Scope, _receive: Receive, send: Send) -> None:
+        await send({"type": "http.response.start", "status": scope["status"], "headers": []})
+        await send({"type": "http.response.body", "body": b""})
+
+    async def wait(seconds: float) -> None:
+        if seconds:
+            held_back.set()
+            while 200 not in answered:
+                await now(0)
+        await now(0)
+
+    async def ask(limit: bodies.BodyLimit, status: int) -> None:
+        async def receive() -> Message:
+            return {"type": "http.request", "body": b""}
+
+        async def send(message: Message) -> None:
+            if message["type"] == "http.response.start":
+                answered.append(message["status"])
+
+        scope = {"type": "http", "method": "POST", "path": "/sign-in", "headers": [], "client": ("10.0.0.1", 1)}
+        await limit({**scope, "status": status}, receive, send)
+
+    async def both() -> None:
+        limit = bodies.BodyLimit(application, [])
+        monkeypatch.setattr(limit, "_taken", lambda _scope: Takes(FEW, "anybody"))
+        async with asyncio.TaskGroup() as group:
+            group.create_task(ask(limit, 429))
+            await held_back.wait()
+            group.create_task(ask(limit, 200))
+
+    now = asyncio.sleep
+    monkeypatch.setattr("app.access.bodies.asyncio.sleep", wait)
+    run(both())
+    assert answered == [200, 429]
 
 
 @pytest.mark.parametrize(("path", "kind"), [("/api/v1/notes", JSON), ("/sign-in", FORM)])
