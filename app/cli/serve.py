@@ -11,7 +11,6 @@ import time
 from collections.abc import Callable
 from contextlib import ExitStack, suppress
 from functools import partial
-from importlib.util import find_spec
 from multiprocessing import parent_process
 from pathlib import Path
 from types import FrameType
@@ -231,9 +230,7 @@ def _serve(settings: "Settings", listening: socket.socket, finish: Callable[[], 
         host=settings.host,
         port=settings.port,
         workers=settings.workers,
-        loop="uvloop"
-        if find_spec("uvloop")
-        else "asyncio:SelectorEventLoop",  # Windows' proactor waits for no PostgreSQL
+        loop="app.web.accepting:Loop",
         http=ServerProtocol,
         ws="none",
         access_log=False,

@@ -67,7 +67,9 @@ async def application(scope: dict[str, Any], receive: Any, send: Any) -> None:
 
 @pytest.fixture(scope="module")
 def port() -> Iterator[int]:
-    config = uvicorn.Config(application, http=Impatient, ws="none", lifespan="off", log_level="critical")
+    config = uvicorn.Config(
+        application, http=Impatient, ws="none", lifespan="off", log_level="critical", loop="app.web.accepting:Loop"
+    )
     server = uvicorn.Server(config)
     with socket.socket() as listening:
         listening.bind(("127.0.0.1", 0))
