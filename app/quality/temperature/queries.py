@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 from sqlalchemy.orm import Session
 
+from app.core.decision.limits import WEAR
 from app.core.drift import WARM_UP, Drift, drift
 from app.core.spc.quantity import Quantity
 from app.core.spc.refusal import Floats, Refused
@@ -26,7 +27,7 @@ class Study(NamedTuple):
 
     of: whose temperature it is; both: part and machine have some. readings, stated: that count, and those of them with a
     temperature. unknown: left out, for nobody knows with which corrections their part was cut. rebuilt: with the corrections
-    taken out; of readings whose corrections nobody knows sizes are as they came out. expected: by the expansion alone, mm/K.
+    taken out; worn: left out, of worn or broken tools. Of readings whose corrections nobody knows sizes are as they came out. expected: by the expansion alone, mm/K.
     """
 
     current: CurrentCharacteristic
@@ -36,6 +37,7 @@ class Study(NamedTuple):
     readings: int
     stated: int
     unknown: int
+    worn: int
     rebuilt: bool
     warm_up: int
     expected: float | None
@@ -57,20 +59,22 @@ def study_of(
     """
     window = statistics.window_of(session, current.characteristic, last=last)
     found, rebuilt = _readings(session, current, window)
-    temperatures = _temperatures(session, current, window, found.series.sequence)
+    parts = statistics.history_of(session, current.characteristic, window, ["measured_at", "zone"])
+    unworn = ~np.isin(found.series.sequence, parts["sequence"][parts["zone"] == WEAR])
+    series, measured_at = found.series.only(unworn), found.measured_at[unworn]
+    temperatures = _temperatures(session, current, window, series.sequence)
     stated = {body: int((~np.isnan(values)).sum()) for body, values in temperatures.items()}
     good = {body: int(((values >= LOWEST) & (values <= HIGHEST)).sum()) for body, values in temperatures.items()}
     chosen: Body = of or ("part" if good["part"] >= good["machine"] else "machine")
     expansion = expansion_of(session, current.machine.id, current.characteristic.id)
-    parts = statistics.history_of(session, current.characteristic, window, ["measured_at"])
     begin, minute = parts["measured_at"][:1], np.timedelta64(1, "m")
     result: Drift | Refused
     try:
         result = drift(
-            found.series.sequence,
-            found.series.values,
-            found.series.edge,
-            (found.measured_at - begin) / minute,
+            series.sequence,
+            series.values,
+            series.edge,
+            (measured_at - begin) / minute,
             temperatures[chosen],
             cut=(parts["sequence"], (parts["measured_at"] - begin) / minute),
             pause=pause,
@@ -83,9 +87,10 @@ def study_of(
         expansion,
         chosen,
         all(stated.values()),
-        len(found.series),
+        len(series),
         stated[chosen],
         len(found.left_out.unknown) if rebuilt else 0,
+        int((~unworn).sum()),
         rebuilt,
         warm_up,
         _expected(expansion, chosen, current.parameters.target),

@@ -53,6 +53,7 @@ class TemperatureOut(BaseModel):
     unbelieved: Annotated[
         int, Field(description="Readings whose temperature cannot be true (below −30 or above 150 °C), left out.")
     ]
+    worn: Annotated[int, Field(description="Readings of worn or broken tools (beyond R37), left out.")]
     rebuilt: Annotated[
         bool,
         Field(description="The corrections are taken out; false: nobody knows them, sizes are as they came out."),
@@ -92,6 +93,7 @@ class TemperatureOut(BaseModel):
             readings=found.readings,
             without=study.readings - study.stated,
             unbelieved=drift.unbelieved,
+            worn=study.worn,
             rebuilt=study.rebuilt,
             lowest=float(drift.temperature.min()),
             highest=float(drift.temperature.max()),

@@ -133,6 +133,15 @@ def _doubts(study: Study, drift: Drift) -> list[str]:
             )
             % {"num": drift.unbelieved, "low": short(LOWEST), "high": short(HIGHEST)}
         )
+    if study.worn:
+        said.append(
+            ngettext(
+                "%(num)s reading of a worn or broken tool is left out.",
+                "%(num)s readings of worn or broken tools are left out.",
+                study.worn,
+            )
+            % {"num": study.worn}
+        )
     if study.unknown:
         said.append(unknown(study.unknown))
     if not study.rebuilt:

@@ -47,6 +47,18 @@ def test_each_effect_is_found_beside_the_others_behind_the_loop(shop: Shop) -> N
     assert any("µm/K" in sentence for sentence in found["text"])
 
 
+def test_a_broken_tool_hides_nothing(shop: Shop) -> None:
+    key = shop.another("broken", tool_memory=0, average_memory=0)
+    sizes, more = mornings()
+    sizes[100:104] = [400.0, 410.0, 420.0, 415.0]
+    shop.push(sizes, key, **more)
+    found = study(shop, characteristic=key)
+    assert (found["readings"], found["worn"]) == (236, 4)
+    assert found["temperature"]["low"] <= 0.0012 <= found["temperature"]["high"]
+    assert found["temperature"]["share"] > 0.2
+    assert "4 readings of worn or broken tools are left out." in found["text"]
+
+
 @pytest.fixture
 def warm(shop: Shop) -> str:
     """A characteristic that only measures, with its mornings."""
