@@ -29,6 +29,7 @@ class Picture(NamedTuple):
     address: str
     part: str = "main"
     size: tuple[int, int] = (1180, 760)
+    person: str = "engineer"
 
 
 PICTURES = {
@@ -42,6 +43,16 @@ PICTURES = {
     "what-if-map": Picture("/characteristics/plate-d30/what-if#map", "#map"),
     "wear-curve": Picture("/characteristics/shaft-d40", "#wear-curve", (1180, 1500)),
     "shift": Picture("/shift"),
+    "notifications": Picture("/setup/notifications", size=(1180, 640), person="admin"),
+    "wall-screen": Picture("/wall#{wall screen}", "body", (1280, 720)),
+    "alarm-load": Picture("/alarms/load", size=(1180, 760)),
+    "causes": Picture("/alarms/causes", size=(1000, 560)),
+    "quarantine": Picture("/quarantines/2", size=(1180, 760)),
+    "control-plan": Picture("/characteristics/flange-t18/control-plan", size=(1180, 900)),
+    "nests": Picture("/characteristics/plate-p48?last=200&by=nest", "plotly-chart.zones > .plot", (1240, 1120)),
+    "temperature": Picture("/characteristics/shaft-l120/temperature", size=(1180, 860)),
+    "ledger": Picture("/ledger", size=(1180, 760)),
+    "shadow-trial": Picture("/characteristics/flange-t18/trial", size=(1180, 760)),
 }
 
 
@@ -49,8 +60,10 @@ def taken(browser: Browser, url: str, people: dict[str, str], picture: Picture) 
     """The picture as PNG."""
     width, height = picture.size
     page = browser.new_page(base_url=url, viewport={"width": width, "height": height}, color_scheme="light")
-    _sign_in(page, people)
-    page.goto(picture.address)
+    _sign_in(page, picture.person, people[picture.person])
+    page.goto(picture.address.format_map(people))
+    if picture.address.startswith("/wall"):
+        page.locator(".wall-machines").wait_for()
     for _tenth in range(LONGEST * 10):  # the page's policy lets no string be evaluated in it again and again
         if page.evaluate(DRAWN):
             break
@@ -72,10 +85,10 @@ def taken(browser: Browser, url: str, people: dict[str, str], picture: Picture) 
     return small.getvalue()
 
 
-def _sign_in(page: Page, people: dict[str, str]) -> None:
+def _sign_in(page: Page, name: str, password: str) -> None:
     page.goto("/sign-in")
-    page.get_by_label("Name").fill("engineer")
-    page.get_by_label("Password").fill(people["engineer"])
+    page.get_by_label("Name").fill(name)
+    page.get_by_label("Password").fill(password)
     page.locator("main button[type=submit]").click()
     page.wait_for_url(lambda at: not at.endswith("/sign-in"))
 
