@@ -2,6 +2,7 @@
 
 import re
 import socket
+from contextlib import suppress
 from ipaddress import IPv4Address, IPv6Address, IPv6Network, ip_address, ip_network
 from typing import NamedTuple
 from urllib.parse import urlsplit
@@ -21,6 +22,10 @@ class Refused(Exception):
     """An address that nothing is sent to; the message says why and what to do."""
 
 
+class Unknown(Refused):
+    """A name that the name service does not know now; it may know it later."""
+
+
 class Place(NamedTuple):
     """A web server: the name in its certificate, the address that is connected to, and the port."""
 
@@ -30,12 +35,16 @@ class Place(NamedTuple):
 
 
 def check(means: str, address: str, settings: Settings) -> None:
-    """Refuse an address that cannot be one of this means, without asking the network. Raises `Refused`."""
+    """Refuse an address that cannot be one of this means, and a webhook that may not lead there. Raises `Refused`.
+
+    Only the name service is asked. Each delivery looks again, for a name may lead elsewhere by then.
+    """
     if means == "mail":
         if not MAIL.fullmatch(address) or ".." in address:
             raise Refused(_("must be one mail address, such as anna@example.com"))
     elif means == "webhook":
-        _parts(address)
+        with suppress(Unknown):
+            place_of(address, settings)
     else:
         if not settings.allow_apprise:
             raise Refused(
@@ -79,7 +88,7 @@ def place_of(url: str, settings: Settings) -> Place:
     try:
         found = [ip_address(each[4][0]) for each in socket.getaddrinfo(host, port, type=socket.SOCK_STREAM)]
     except (OSError, UnicodeError) as error:
-        raise Refused(_("{host} is not known to the name service: {error}").format(host=host, error=error)) from None
+        raise Unknown(_("{host} is not known to the name service: {error}").format(host=host, error=error)) from None
     networks = [ip_network(each) for each in settings.webhook_networks.split(",") if each]
     for address in found:
         inside = any(_real(address) in network for network in networks)

@@ -495,6 +495,22 @@ def test_webhooks_do_not_lead_to_a_server_that_only_listens_inside(hooks: Hooks)
     assert hooks.at("/secret") == []
 
 
+@pytest.mark.parametrize("address", ["https://10.1.2.3/x", "http://[::ffff:10.1.2.3]/x", "https://169.254.169.254/"])
+def test_a_webhook_inside_the_network_is_refused_when_it_is_added(shop: Shop, address: str) -> None:
+    """Whoever adds it is the one who can put it right; a delivery that fails at night reaches nobody."""
+    andon = receiver(shop, "https://no-such-name.invalid/x")  # a name may be entered before the name service knows it
+    add: dict[str, Any] = {"name": "Andon", "means": "webhook", "address": address}
+    change: dict[str, Any] = {"address": address}
+    for method, path, sent in (
+        ("POST", "/notifications/receivers", add),
+        ("PATCH", f"/notifications/receivers/{andon['id']}", change),
+    ):
+        problem = shop.call(method, path, 422, **sent)
+        assert [each["field"] for each in problem["errors"]] == ["address"]
+        assert "INBAND_WEBHOOK_NETWORKS" in problem["errors"][0]["message"]
+    assert shop.call("GET", f"/notifications/receivers/{andon['id']}")["address"] == andon["address"]
+
+
 def mail(server: str, to: str = "anna@example.com", **settings: Any) -> Answer:
     job = Job(1, 1, "test", "mail", to, None, Message("Tool\r\nworn", "Text\n"))
     return run(deliver(job, Settings(mail_server=server, **settings)))
