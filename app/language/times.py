@@ -11,7 +11,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from contextvars import ContextVar
-from datetime import UTC, datetime, time, timedelta
+from datetime import UTC, date, datetime, time, timedelta
 from functools import cache
 from typing import TYPE_CHECKING, NamedTuple
 from zoneinfo import ZoneInfo
@@ -87,17 +87,27 @@ def begin_of_day(at: datetime, days: int = 0) -> datetime:
 
 def begin_of_shift(at: datetime) -> datetime:
     """The beginning of the shift in which the moment lies."""
-    there = local(at)
-    days = (there.date(), there.date() - timedelta(1))
-    begins = (datetime.combine(day, begin, plant_zone()) for day in days for begin in reversed(_time().shifts))
-    return next(begin for begin in begins if begin <= there)
+    day = local(at).date()
+    moment = at.astimezone(UTC)
+    return [begin for begin in _begins(day - timedelta(1), day) if begin.astimezone(UTC) <= moment][-1]
 
 
 def end_of_shift(at: datetime) -> datetime:
     """The end of the shift in which the moment lies: the beginning of the next one."""
-    days = (local(at).date(), local(at).date() + timedelta(1))
-    begins = (datetime.combine(day, begin, plant_zone()) for day in days for begin in _time().shifts)
-    return next(begin for begin in begins if begin.astimezone(UTC) > at)
+    day = local(at).date()
+    moment = at.astimezone(UTC)
+    return next(begin for begin in _begins(day, day + timedelta(1)) if begin.astimezone(UTC) > moment)
+
+
+def _begins(first: date, last: date, plant: PlantTime | None = None) -> list[datetime]:
+    """Beginnings of the shifts of these days, ascending.
+
+    By the moment, not by the clock: one that falls into the hour which the clock skips begins after it, perhaps after the next one.
+    """
+    zone, shifts = plant or PlantTime(plant_zone(), _time().shifts)
+    days = (first + timedelta(n) for n in range((last - first).days + 1))
+    begins = {datetime.combine(day, at, zone).astimezone(UTC) for day in days for at in shifts}
+    return [begin.astimezone(zone) for begin in sorted(begins)]
 
 
 def shifts_now() -> str:
@@ -121,10 +131,11 @@ def begins_of_shifts(first: datetime, last: datetime, kept: str | None = None) -
     clocks, name = (kept or shifts_now()).rsplit(" ", 1)
     zone, shifts = ZoneInfo(name), [time.fromisoformat(each) for each in clocks.split(",")]
     day, end = first.astimezone(zone).date() - timedelta(1), last.astimezone(zone).date()
-    days = (day + timedelta(n) for n in range((end - day).days + 1))
-    begins = [datetime.combine(day, at, zone) for day in days for at in shifts]
-    ends = [*begins[1:], last + timedelta(1)]
-    return [begin for begin, after in zip(begins, ends, strict=True) if begin <= last and first < after]
+    begins = _begins(day, end, PlantTime(zone, shifts))
+    of, until = first.astimezone(UTC), last.astimezone(UTC)
+    moments = [begin.astimezone(UTC) for begin in begins]
+    ends = [*moments[1:], until + timedelta(1)]
+    return [begin for begin, at, after in zip(begins, moments, ends, strict=True) if at <= until and of < after]
 
 
 def is_twice(at: datetime) -> bool:

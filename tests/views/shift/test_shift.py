@@ -1,11 +1,13 @@
 """A shift: over REST and on its page, the same as what was pushed and answered in it."""
 
+from contextvars import copy_context
 from datetime import UTC, datetime, timedelta
 
 import pytest
 from sqlalchemy import text
 
-from app.language.times import begin_of_shift, end_of_shift
+from app.language.times import begin_of_shift, begins_of_shifts, end_of_shift, keep_time_of, plant_time
+from app.settings import Settings
 from tests.conftest import Server
 from tests.shop import Person, Shop
 
@@ -88,6 +90,23 @@ def test_its_page_leads_from_shift_to_shift(ran: Shop, server: Server) -> None:
     assert "Next shift" not in viewer.open("/shift")
     assert "Nothing was measured" in viewer.open("/shift?at=1971-01-01")
     assert "at:" in viewer.open("/shift?at=yesterday", 422)
+
+
+@pytest.mark.parametrize("zone", ["Europe/Belgrade", "America/New_York", "Africa/Cairo"])
+@pytest.mark.parametrize("shifts", ["06:00,14:00,22:00", "02:30", "00:30", "02:00,02:30,03:00,14:00"])
+@pytest.mark.parametrize("month", [(2026, 3, 1), (2026, 4, 1), (2026, 10, 1), (2026, 11, 1)])
+def test_shifts_follow_each_other_when_the_clock_changes(zone: str, shifts: str, month: tuple[int, int, int]) -> None:
+    def looked_at() -> None:
+        keep_time_of(plant_time(Settings(timezone=zone, shifts=shifts)))
+        moments = [datetime(*month, tzinfo=UTC) + n * timedelta(minutes=30) for n in range(31 * 48)]
+        begins = [begin_of_shift(at).astimezone(UTC) for at in moments]
+        ends = [end_of_shift(at).astimezone(UTC) for at in moments]
+        assert all(begin <= at < end for begin, at, end in zip(begins, moments, ends, strict=True))
+        assert all(after in (begin, end) for begin, end, after in zip(begins, ends, begins[1:], strict=False))
+        found = [each.astimezone(UTC) for each in begins_of_shifts(moments[0], moments[-1])]
+        assert found == sorted(set(begins))
+
+    copy_context().run(looked_at)
 
 
 def test_shifts_follow_each_other_without_a_gap() -> None:
