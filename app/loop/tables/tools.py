@@ -12,6 +12,7 @@ OUTSTANDING = ("awaiting_approval", "pending")  # issued, not yet in effect
 OPEN = ("held", *OUTSTANDING)
 OPPOSITE = "opposite_effect"  # the alarm of corrections that did the opposite of what they asked
 EARLY = "early_effect"  # that of corrections that act before they are counted
+DOUBT = "correction_in_doubt"  # that of a reading whose correction_in_effect does not fit
 OPPOSED = "opposite effect, alarm:"  # why corrections fell, as it is stored; the number of the alarm goes with it
 COUNTED_LATE = "early effect, alarm:"
 FELL = {OPPOSITE: OPPOSED, EARLY: COUNTED_LATE}

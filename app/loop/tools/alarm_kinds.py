@@ -7,7 +7,7 @@ from app.language.numbers import PLUS_MINUS, age, as_read, fixed, mm, signed, um
 from app.loop.alarms.kinds import AlarmKind, register
 from app.loop.alarms.reading_kinds import moved_by
 from app.loop.tables.alarms import Alarm
-from app.loop.tables.tools import EARLY, OPPOSITE
+from app.loop.tables.tools import DOUBT, EARLY, OPPOSITE
 
 
 def _differs(alarm: Alarm) -> str:
@@ -123,6 +123,58 @@ EARLY_EFFECT = register(
                 _("Clock set"),
                 _("Sends the number of the last correction"),
                 _("Confirms before the next part"),
+            ]
+        },
+    )
+)
+
+
+def _in_doubt(alarm: Alarm) -> str:
+    data = alarm.data
+    text = {
+        "fell": _(
+            "Correction {number} cannot be in effect, as a reading of {characteristic} says: {fell}. If the control has added "
+            "it to tool {of_tool} all the same, the offset differs from what Inband counts."
+        ),
+        "not_issued": _(
+            "A reading of {characteristic} names correction {number}, which was issued after its part was cut: at {issued_at}, the "
+            "part by machined_at at {machined_at}. Either the clock of the machine is behind, or the number is not that of the part."
+        ),
+    }.get(
+        str(data.get("why")),
+        _(
+            "A reading of {characteristic} confirms corrections of tool {tool} by {number}, of tool {of_tool}. That is right only where "
+            "the machine applies the corrections of all tools in the order of their numbers."
+        ),
+    )
+    fell = {
+        "held": _("it is held"),
+        "awaiting_approval": _("it awaits approval"),
+        "rejected": _("it was rejected"),
+    }.get(str(data.get("status")), _("it has fallen"))
+    moments = {
+        name: as_read(datetime.fromisoformat(data[name])) for name in ("machined_at", "issued_at") if name in data
+    }
+    return text.format(**data | moments, fell=fell, tool=alarm.tool_memory)
+
+
+CORRECTION_IN_DOUBT = register(
+    AlarmKind(
+        DOUBT,
+        concerns_parts=True,
+        word=lambda: _("Correction in doubt"),
+        sentence=_in_doubt,
+        what_to_do=lambda: _(
+            "Look at what the machine sends as correction_in_effect, and at its clock. Read the offset at the control; if it differs, "
+            "enter it under Tools."
+        ),
+        icon="waiting",
+        comments={
+            "noted": lambda: [
+                _("Program that sends the number corrected"),
+                _("Clock set"),
+                _("Offset at the control is right"),
+                _("All tools take corrections in the order of their numbers"),
             ]
         },
     )

@@ -27,6 +27,7 @@ def made_by(kind: str) -> str:
         "offset_differs": _("offset that the control reports"),
         "opposite_effect": _("factor, or the offset register"),
         "early_effect": _("machined_at, correction_in_effect, or the confirmation"),
+        "correction_in_doubt": _("correction_in_effect"),
         "unusual_gain": _("factor"),
         "characteristics_disagree": _("targets and empirical values of two characteristics"),
         "corrections_not_taken": _("INBAND_CORRECTIONS_TAKEN_WITHIN"),

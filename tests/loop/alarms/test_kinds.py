@@ -68,6 +68,14 @@ DATA: dict[str, list[dict[str, Any]]] = {
         {"characteristic": "seat", "share": 0.98, "error": 0.09, "after": 1, "lag": 7200.0, "by": by}
         for by in ("machined_at", "correction_in_effect", "confirmation")
     ],
+    "correction_in_doubt": [
+        {"characteristic": "seat", "number": 17, "of_tool": 7} | more
+        for more in (
+            {"why": "fell", "status": "rejected"},
+            {"why": "not_issued", "machined_at": _AT, "issued_at": _AT},
+            {"why": "another_tool"},
+        )
+    ],
     "offset_differs": [{"reported": -0.0142, "expected": -0.0061}, {"correction": 9, "reported": 1.0, "expected": 0.9}],
     "corrections_not_taken": [
         {"waiting": 1, "first": 12, "since": _AT},

@@ -35,6 +35,7 @@ from app.loop.readings.writer.binary_copy import (
 )
 from app.loop.readings.writer.corrections_in_effect import CorrectionsInEffect, confirms, corrections_in_effect
 from app.loop.readings.writer.decide import decide_reading
+from app.loop.readings.writer.doubts import fell
 from app.loop.readings.writer.pending import PendingAverage, PendingStream, PendingWrites, Stored, Verdict
 from app.loop.readings.writer.snapshot import Part
 
@@ -75,7 +76,8 @@ class _Group:
             and parameters.accept_m == 1
             and parameters.plausible_jump is None
             and (in_effect is None or in_effect <= self.pending.last_number(state.entry.machine_id))
-            and not confirms(self.pending, state.tool, in_effect),
+            and not confirms(self.pending, state.tool, in_effect)
+            and not fell(self.pending, state.tool, in_effect),
         ), effect._replace(amounts=())
 
 

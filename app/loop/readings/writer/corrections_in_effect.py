@@ -14,6 +14,7 @@ from app.core.decision.step import DECIMALS, rounded
 from app.core.parameters import Feature, Parameters
 from app.loop.readings.records import MOST_OUTSTANDING
 from app.loop.readings.schemas import ReadingIn
+from app.loop.readings.writer.doubts import fell
 from app.loop.readings.writer.pending import (
     EffectTally,
     OffsetChange,
@@ -69,7 +70,8 @@ class CorrectionsInEffect(NamedTuple):
 
     previous_tool: with an offset from before a tool change or an edit by hand. outstanding: numbers of the corrections it
     was cut without, of very many the first; amounts: of all of them, mm of offset, valid until the next reading is decided.
-    compensated: the sum (mm) of those of this tool's life that it was cut with, None with a previous tool.
+    compensated: the sum (mm) of those of this tool's life that it was cut with; None with a previous tool, and where one that has
+    fallen may be among them.
     """
 
     previous_tool: bool
@@ -94,7 +96,7 @@ def corrections_in_effect(
     if tool.reset_at is not None and reading.machined_at is not None:
         previous_tool = reading.machined_at < tool.reset_at
     compensated = None
-    if not previous_tool:
+    if not previous_tool and not fell(pending, tool, reading.correction_in_effect):
         compensated = tool.total
         for amount in tally.applied_since:
             compensated -= amount
@@ -122,10 +124,12 @@ def confirms(pending: PendingWrites, tool: PendingTool | None, in_effect: int | 
     return tool is not None and in_effect is not None and _tally(pending, tool, in_effect).confirms
 
 
-def confirm(pending: PendingWrites, stream: PendingStream, tool: PendingTool, in_effect: int, at: datetime) -> None:
-    """Apply this tool's pending corrections up to `in_effect`, which the machine says it cut with."""
-    if not confirms(pending, tool, in_effect):
-        return
+def confirm(
+    pending: PendingWrites, stream: PendingStream, tool: PendingTool | None, in_effect: int | None, at: datetime
+) -> bool:
+    """Apply this tool's pending corrections up to `in_effect`, which the machine says it cut with; tell if there are any."""
+    if tool is None or in_effect is None or not confirms(pending, tool, in_effect):
+        return False
     last = pending.named_correction(tool.machine_id, in_effect)
     for place, issued in enumerate(tool.corrections):
         if issued.status != "pending" or not _took_effect(issued, in_effect, last):
@@ -154,6 +158,7 @@ def confirm(pending: PendingWrites, stream: PendingStream, tool: PendingTool, in
         )
         pending.touched_machines.add(tool.machine_id)
     tool.forget()
+    return True
 
 
 def issued_total(pending: PendingWrites, tool: PendingTool | None) -> float:

@@ -23,6 +23,7 @@ from app.loop.readings.miscounted import TooManyTouches
 from app.loop.readings.records import Entry
 from app.loop.readings.schemas import ReadingIn
 from app.loop.readings.writer.corrections_in_effect import confirm, corrections_in_effect, issued_total
+from app.loop.readings.writer.doubts import doubt
 from app.loop.readings.writer.opposed import name_correction, part_of, pauses, remember
 from app.loop.readings.writer.pending import (
     PendingAlarm,
@@ -88,8 +89,7 @@ def decide_reading(pending: PendingWrites, entry: Entry, reading: ReadingIn, now
     _refuse_unissued(pending, entry, in_effect)
     sequence = stream.sequence + 1
     measured_at = now if reading.measured_at is None else reading.measured_at.astimezone(UTC)
-    if tool is not None and tool.corrections and in_effect is not None:
-        confirm(pending, stream, tool, in_effect, min(now, reading.machined_at or measured_at))
+    confirmed = confirm(pending, stream, tool, in_effect, min(now, reading.machined_at or measured_at))
     previous_tool, outstanding, amounts, compensated = corrections_in_effect(pending, tool, reading, parameters)
     average = stream.average
     empirical_value = average.empirical_value if average and not reading.is_by_hand else 0.0
@@ -124,8 +124,11 @@ def decide_reading(pending: PendingWrites, entry: Entry, reading: ReadingIn, now
         paused_by, decision = opposed, judged(state=state._replace(paused=True))
     alarms = [_signal(pending, stream, signal, sequence, decision, results, fault) for signal in decision.alarms]
     name_correction(alarms, stream, newest)
-    alarms += [] if opposed is None else [opposed]
-    correction = _issue(pending, stream, tool, sequence, decision) if tool and decision.amount is not None else None
+    asked = doubt(pending, stream, reading, sequence, confirmed)
+    alarms += [alarm for alarm in (opposed, asked) if alarm is not None]
+    correction = (
+        _issue(pending, stream, tool, sequence, decision, now) if tool and decision.amount is not None else None
+    )
     verdict = Verdict(
         stream=stream,
         reading=reading,
@@ -260,7 +263,7 @@ def _first_with_key(pending: PendingWrites, entry: Entry, key: str, reading: Rea
 
 
 def _issue(
-    pending: PendingWrites, stream: PendingStream, tool: PendingTool, sequence: int, decision: Decision
+    pending: PendingWrites, stream: PendingStream, tool: PendingTool, sequence: int, decision: Decision, now: datetime
 ) -> PendingCorrection:
     """Number the correction; whatever is held for this tool is superseded by it, so that they never add up."""
     number = pending.last_number(tool.machine_id) + 1
@@ -286,6 +289,7 @@ def _issue(
         characteristic_id=stream.entry.characteristic_id,
         sequence=sequence,
         size_error=decision.size_error or 0.0,
+        issued_at=now,
         new=True,
     )
     tool.corrections.append(correction)

@@ -5,7 +5,6 @@ faster than arrays for one row and for sixty-four.
 """
 
 from collections.abc import Iterable, Sequence
-from datetime import datetime
 from typing import Any
 
 import msgspec
@@ -32,7 +31,7 @@ ParametersCache = dict[tuple[int, int], Parameters]
 
 class _Loaded(msgspec.Struct):
     streams: list[tuple[LoadedStream, LoadedAverage | None, LoadedTool | None]]
-    named: list[tuple[int, int, datetime | None, datetime | None, datetime | None]] | None
+    named: list[tuple[int, int, NamedCorrection]] | None
     known: list[tuple[int, str, int, float, int, bool]] | None
 
 
@@ -102,8 +101,9 @@ async def _load(
         snapshot.forget()
     for machine_id, last, version in states:
         snapshot.last_correction[machine_id], snapshot.versions[machine_id] = last, version
-    for machine_id, number, applied_at, decided_at, fetched_at in loaded.named or ():
-        snapshot.named[machine_id, number] = NamedCorrection(applied_at, decided_at, fetched_at)
+    for machine_id, number, named in loaded.named or ():
+        snapshot.named[machine_id, number] = named
+        applied_at = named.applied_at
         if applied_at is not None:  # for readings of form, which are loaded after these: their tools go back as far
             since = machines[machine_id]["since"]
             machines[machine_id]["since"] = applied_at if since is None else min(since, applied_at)

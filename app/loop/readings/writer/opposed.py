@@ -17,6 +17,7 @@ from app.core.decision.step import Action
 from app.core.early import acts_early
 from app.core.gain import LONGEST, Step, against, expected_scatter, opposed
 from app.loop.readings.schemas import ReadingIn
+from app.loop.readings.writer.doubts import follow_statuses
 from app.loop.readings.writer.pending import PendingAlarm, PendingStream, PendingTool, PendingWrites
 from app.loop.readings.writer.snapshot import Part
 from app.loop.tables.tools import EARLY, OPPOSITE
@@ -90,6 +91,7 @@ def _paused(
     pending.raised.append(alarm)
     pending.touched_machines.add(tool.machine_id)
     tool.pause(alarm)
+    follow_statuses(pending, tool)
     return alarm
 
 

@@ -71,6 +71,7 @@ class PendingCorrection:
     applied_at: datetime | None = None
     decided_at: datetime | None = None
     fetched_at: datetime | None = None
+    issued_at: datetime | None = None
     applied_by: str | None = None
     offset_after: float | None = None
     superseded_by: int | None = None
@@ -333,7 +334,10 @@ class PendingWrites:
         snapshot.named |= self.named
         if len(snapshot.named) > MOST_NAMED:
             snapshot.named = {}
-        snapshot.named |= {(c.machine_id, c.number): NamedCorrection(None, None) for c in self.issued}
+        snapshot.named |= {
+            (c.machine_id, c.number): NamedCorrection(None, None, None, c.status, c.tool_memory, c.issued_at)
+            for c in self.issued
+        }
 
     def _settled(self, tool: PendingTool) -> LoadedTool:
         return structs.replace(

@@ -12,10 +12,12 @@ from msgspec import structs
 from app.db.pipeline import Pipeline, Step
 from app.loop.readings.records import Entry, Record
 from app.loop.readings.writer.binary_copy import array_of_int4
+from app.loop.readings.writer.doubts import doubts, leave_out_answered
 from app.loop.readings.writer.pending import PendingStream, PendingTool, PendingWrites, Verdict, alarm_number
 from app.loop.readings.writer.statements import (
     ACTIVE_ALARMS,
     ALARM_NUMBERS,
+    ANSWERED_DOUBTS,
     BASE_LEVEL,
     CHANGE_CORRECTIONS,
     CONTEXT,
@@ -102,6 +104,13 @@ async def save(pipeline: Pipeline, pending: PendingWrites, *, begun: bool, notif
 async def _number_alarms(pipeline: Pipeline, pending: PendingWrites, opening: list[Step]) -> None:
     """Find the alarms that are active for the same trouble already, and draw numbers for the others."""
     machines = {alarm.machine_id for alarm in pending.raised}
+    if any(doubts(pending)):
+        *_opened, found = await pipeline.run([*opening, (ANSWERED_DOUBTS, array(machines))])
+        answered = [
+            (int(machine or 0), int(tool or 0), (why or b"").decode(), int(n or 0)) for machine, tool, why, n in found
+        ]
+        leave_out_answered(pending, answered)
+        opening = []
     *_opened, rows = await pipeline.run([*opening, (ACTIVE_ALARMS, array(machines))])
     active = {
         (int(machine or 0), _number(characteristic), _number(tool), (kind or b"").decode()): _number(alarm)

@@ -40,11 +40,17 @@ class LoadedCorrection(NamedTuple):
 
 
 class NamedCorrection(NamedTuple):
-    """The last correction that a machine had applied when it cut a part: its time, and the time of a person's decision."""
+    """The last correction that a machine had applied when it cut a part: its time, and the time of a person's decision.
+
+    status, tool_memory, issued_at: None where nothing is known of them.
+    """
 
     applied_at: datetime | None
     decided_at: datetime | None
     fetched_at: datetime | None = None
+    status: str | None = None
+    tool_memory: int | None = None
+    issued_at: datetime | None = None
 
 
 class LoadedTool(msgspec.Struct, frozen=True, kw_only=True, array_like=True):

@@ -16,6 +16,7 @@ from app.core.variants import Results
 from app.db.events import CHANNEL, PUBLISHED
 from app.loop.readings.records import Record
 from app.loop.readings.writer.snapshot import MOST_APPLIED
+from app.loop.tables.tools import DOUBT
 
 _json = msgspec.json.Encoder(enc_hook=list)  # a list that is shared by many rows
 
@@ -57,7 +58,7 @@ GUARD = f"WITH {_GUARD} SELECT * FROM guard"  # noqa: S608 - made of constants
 LOAD = f"""
 WITH doc AS MATERIALIZED (SELECT $1::json AS d),
 named AS MATERIALIZED (
-    SELECT c.machine_id, c.number, c.applied_at, c.fetched_at,
+    SELECT c.machine_id, c.number, c.applied_at, c.fetched_at, c.status, c.tool_memory, c.created_at,
         CASE WHEN c.status IN ('pending', 'applied') THEN c.decided_at END AS decided_at  -- not when it was dropped
     FROM json_to_recordset((SELECT d -> 'named' FROM doc)) AS w(machine_id int, number int)
     JOIN correction c ON c.machine_id = w.machine_id AND c.number = w.number
@@ -130,7 +131,8 @@ SELECT json_build_object(
         LEFT JOIN average_memory a ON a.machine_id = s.machine_id AND a.location = s.average_memory
         LEFT JOIN tool t ON t.machine_id = s.machine_id AND t.number = s.tool_memory
     ),
-    'named', (SELECT json_agg(json_build_array(machine_id, number, applied_at, decided_at, fetched_at)) FROM named),
+    'named', (SELECT json_agg(json_build_array(machine_id, number, json_build_array(
+        applied_at, decided_at, fetched_at, status, tool_memory, created_at))) FROM named),
     'known', (
         SELECT json_agg(json_build_array(r.characteristic_id, r.key, r.sequence, r.measured, r.parameters_version,
             r.code = 'first_move_triggered'))
@@ -182,6 +184,12 @@ LEFT JOIN LATERAL (
     ) a
 ) a ON p.after_alarm > 0
 WHERE p.every IS NOT NULL OR p.after_change > 0 OR p.after_alarm > 0
+"""  # noqa: S608 - made of constants
+# The doubts that somebody has answered: each is raised once.
+ANSWERED_DOUBTS = f"""
+SELECT machine_id, tool_memory, data ->> 'why', CASE data ->> 'why' WHEN 'another_tool' THEN '0' ELSE data ->> 'number' END
+FROM alarm
+WHERE machine_id = ANY($1::int[]) AND characteristic_id IS NULL AND kind = '{DOUBT}' AND acknowledged_at IS NOT NULL
 """  # noqa: S608 - made of constants
 ALARM_NUMBERS = "SELECT nextval('alarm_id') FROM generate_series(1, $1::int)"
 

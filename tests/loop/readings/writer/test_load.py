@@ -25,7 +25,8 @@ def test_tools_of_form_go_back_to_the_oldest_correction_that_any_reading_names()
     """A correction that was released between two that are named is in the part of neither, and may be corrected only once."""
     nine, ten = (datetime(2026, 3, 2, hour, tzinfo=UTC) for hour in (9, 10))
     machines: dict[int, dict[str, Any]] = {1: {"number": 3, "since": None}}
-    named = [(1, 5, ten, None, None), (1, 3, nine, None, None), (1, 6, None, None, None)]
+    times = [(5, ten), (3, nine), (6, None)]
+    named = [(1, number, (at, None, None, "applied" if at else "pending", 3, nine)) for number, at in times]
     answer = cast("Pipeline", Answer(named=named))
     run(load._load(answer, {}, Snapshot(), (), machines, (), optimistic=True))
     assert machines == {1: {"number": 3, "since": nine}}

@@ -1,0 +1,90 @@
+"""Doubts about the number that a reading names as the last correction in effect: it cannot be right, or only perhaps.
+
+The reading is decided by its number all the same, which is the best that is known; the alarm asks what does not fit. Each doubt is
+raised once: after its answer the machine may go on naming that number until it has applied the next one.
+"""
+
+from collections.abc import Iterable, Iterator
+from datetime import timedelta
+from typing import Any
+
+from app.loop.readings.schemas import ReadingIn
+from app.loop.readings.writer.pending import PendingAlarm, PendingStream, PendingTool, PendingWrites
+from app.loop.tables.tools import DOUBT
+
+LET_GO = ("pending", "applied")
+BEHIND = timedelta(minutes=1)  # that clocks of a machine and of the server may differ
+ANOTHER_TOOL = "another_tool"
+
+
+def fell(pending: PendingWrites, tool: PendingTool | None, number: int | None) -> bool:
+    """Tell if no machine should have applied the correction that a reading names: it waits for a person, or has fallen."""
+    named = None if tool is None or number is None else pending.named_correction(tool.machine_id, number)
+    return named is not None and named.status is not None and named.status not in LET_GO
+
+
+def doubt(
+    pending: PendingWrites, stream: PendingStream, reading: ReadingIn, sequence: int, confirms: bool
+) -> PendingAlarm | None:
+    """Return the alarm that asks about the number of a reading, or None. confirms: it applies pending corrections of its tool."""
+    tool, number = stream.tool, reading.correction_in_effect
+    named = None if tool is None or number is None else pending.named_correction(tool.machine_id, number)
+    if tool is None or named is None or named.status is None:
+        return None
+    data: dict[str, Any] = {"characteristic": stream.entry.characteristic, "number": number}
+    if fell(pending, tool, number):
+        data |= {"why": "fell", "status": named.status}
+    elif (
+        reading.machined_at is not None
+        and named.issued_at is not None
+        and reading.machined_at < named.issued_at - BEHIND
+    ):
+        data |= {
+            "why": "not_issued",
+            "machined_at": reading.machined_at.isoformat(),
+            "issued_at": named.issued_at.isoformat(),
+        }
+    elif confirms and named.tool_memory != tool.number:
+        data["why"] = ANOTHER_TOOL
+    else:
+        return None
+    data["of_tool"] = named.tool_memory
+    at = (tool.machine_id, tool.number, DOUBT)
+    alarm = pending.tool_alarms.get(at)
+    if alarm is None:
+        alarm = pending.tool_alarms[at] = PendingAlarm(
+            machine_id=tool.machine_id, characteristic_id=None, tool_memory=tool.number, kind=DOUBT, sequence=sequence
+        )
+        pending.raised.append(alarm)
+    alarm.data, alarm.last_sequence = data, sequence
+    alarm.count += 1
+    return alarm
+
+
+def follow_statuses(pending: PendingWrites, tool: PendingTool) -> None:
+    """Let what is known of named corrections follow those that these readings have changed."""
+    for correction in tool.written():
+        at = (tool.machine_id, correction.number)
+        if (named := pending.named_correction(*at)) is not None:
+            pending.named[at] = named._replace(status=correction.status)
+
+
+def leave_out_answered(pending: PendingWrites, answered: Iterable[tuple[int, int, str, int]]) -> None:
+    """Drop doubts that somebody has answered. answered: machine, tool, why and number of each."""
+    known = set(answered)
+    gone = {id(alarm) for alarm in doubts(pending) if known & _keys(alarm)}
+    if gone:
+        pending.raised = [alarm for alarm in pending.raised if id(alarm) not in gone]
+        for verdict in pending.verdicts:
+            verdict.alarms = [alarm for alarm in verdict.alarms if id(alarm) not in gone]
+
+
+def doubts(pending: PendingWrites) -> Iterator[PendingAlarm]:
+    """The doubts among the alarms that these readings raise."""
+    return (alarm for alarm in pending.raised if alarm.kind == DOUBT)
+
+
+def _keys(alarm: PendingAlarm) -> set[tuple[int, int, str, int]]:
+    """Keys of the doubts that an answer to this alarm settles. That all tools go by one order of numbers is said once for a tool."""
+    why, number = alarm.data["why"], 0 if alarm.data["why"] == ANOTHER_TOOL else alarm.data["number"]
+    return {(alarm.machine_id, alarm.tool_memory or 0, why, number)}

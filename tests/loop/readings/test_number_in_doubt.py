@@ -1,0 +1,89 @@
+"""A correction_in_effect that does not fit is asked about, once, and leads to no wrong base."""
+
+from datetime import UTC, datetime, timedelta
+from typing import Any
+
+import pytest
+
+from tests.loop.readings.test_compensated import kept
+from tests.shop import Shop
+
+
+def doubts(shop: Shop, state: str = "active") -> list[Any]:
+    return [each for each in shop.alarms(state) if each["kind"] == "correction_in_doubt"]
+
+
+def issued(shop: Shop) -> int:
+    number: int = shop.read(6)["correction"]["number"]
+    return number
+
+
+def test_one_that_was_rejected_is_asked_about_once(shop: Shop) -> None:
+    number = issued(shop)
+    shop.correction(number, "rejected", reason="control is busy")
+    answer = shop.read(0.5, correction_in_effect=number)
+    assert answer["outstanding"] == []
+    (alarm,) = doubts(shop)
+    assert answer["alarms"] == [{"id": alarm["id"], "kind": "correction_in_doubt"}]
+    assert f"Correction {number} cannot be in effect" in alarm["text"]
+    assert "it was rejected" in alarm["text"]
+    assert alarm["tool_memory"] == 3
+    shop.acknowledge(alarm["id"], "noted")
+    assert shop.read(0.5, correction_in_effect=number)["alarms"] == []
+    assert doubts(shop) == []
+
+
+def test_it_says_nothing_of_the_effect_of_corrections(shop: Shop) -> None:
+    number = issued(shop)
+    shop.correction(number, "rejected", reason="control is busy")
+    shop.read(0.5, correction_in_effect=number)
+    shop.push([0.4] * 70, correction_in_effect=[number] * 70)
+    assert len(doubts(shop)) == 1
+    assert [compensated for compensated, _numbers in kept(shop)] == [0.0] + [None] * 71
+
+
+def test_one_that_awaits_approval(shop: Shop) -> None:
+    key = shop.another("approved", tool_memory=4, average_memory=6, mode="approval")
+    number = shop.read(6, key)["correction"]["number"]
+    shop.read(0.5, key, correction_in_effect=number)
+    (alarm,) = doubts(shop)
+    assert "it awaits approval" in alarm["text"]
+    assert shop.correction(number)["status"] == "awaiting_approval"
+
+
+def test_a_part_that_was_cut_before_it_was_issued(shop: Shop) -> None:
+    number = issued(shop)
+    cut = datetime.now(UTC) - timedelta(hours=2)
+    answer = shop.read(0.5, correction_in_effect=number, machined_at=cut.isoformat())
+    assert answer["outstanding"] == [], "the number is what counts"
+    (alarm,) = doubts(shop)
+    assert f"names correction {number}, which was issued after its part was cut" in alarm["text"]
+    assert "the clock of the machine is behind" in alarm["text"]
+
+
+def test_the_number_of_another_tool_that_confirms(shop: Shop) -> None:
+    other = shop.another("bore", tool_memory=7, average_memory=7)
+    own = issued(shop)
+    number = shop.read(6, other)["correction"]["number"]
+    shop.read(0.5, correction_in_effect=number)
+    assert shop.correction(own)["status"] == "applied"
+    (alarm,) = doubts(shop)
+    assert f"confirms corrections of tool 3 by {number}, of tool 7" in alarm["text"]
+    shop.acknowledge(alarm["id"], "noted")
+    own = shop.read(6, correction_in_effect=number)["correction"]["number"]
+    number = shop.read(20, other)["correction"]["number"]
+    shop.read(0.5, correction_in_effect=number)
+    assert shop.correction(own)["status"] == "applied"
+    assert doubts(shop) == [], "answered for this tool"
+
+
+@pytest.mark.parametrize("batch", [False, True])
+def test_what_fits_raises_no_doubt(shop: Shop, batch: bool) -> None:
+    number = issued(shop)
+    cut = datetime.now(UTC).isoformat()
+    if batch:
+        shop.push([0.5, 0.4], correction_in_effect=[number] * 2, machined_at=[cut] * 2)
+    else:
+        shop.read(0.5, correction_in_effect=number, machined_at=cut)
+    shop.read(0.5, correction_in_effect=0)
+    assert doubts(shop, "all") == []
