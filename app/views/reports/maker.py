@@ -11,6 +11,7 @@ import signal
 import sys
 import time
 from datetime import UTC, datetime
+from typing import TextIO
 from uuid import uuid4
 
 import psycopg
@@ -37,6 +38,7 @@ log = logging.getLogger(__name__)
 
 LONGEST_REST = 1.0  # s
 NAME = "making_reports"  # as periodic jobs have one, where it fails
+PROVED = "proved"
 
 
 class Maker:
@@ -134,12 +136,20 @@ def _report_of(session: Session, bundle: Bundle, key: str, by: str) -> Report:
     return queries.report_of(session, current, bundle.request, datetime.now(UTC), by)
 
 
+def told(words: TextIO) -> Settings:
+    """Settings of the server; it says as well if its engine has proved itself, which is this one."""
+    settings = Settings.model_validate_json(words.readline())
+    if words.readline().strip() == PROVED:
+        proof.passed_elsewhere()
+    return settings
+
+
 def main() -> None:
-    """Take settings and numbers from standard input."""
+    """Take what the server tells, then numbers, from standard input."""
     end_with(int(sys.argv[1]))
     answers, sys.stdout = sys.stdout, sys.stderr
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C reaches the whole group; the server ends this process
-    settings = Settings.model_validate_json(sys.stdin.readline())
+    settings = told(sys.stdin)
     logs.configure(settings.log_level, settings.log_format)
     use_zone(settings)
     with Connections(settings.database_url or "", settings.database_patience) as connections:

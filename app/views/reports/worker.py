@@ -24,9 +24,10 @@ from app.db.engine import Database
 from app.db.outage import Outage
 from app.jobs.actions import DatabaseGone, Unit, note_failure, paused_units
 from app.memory import BEHIND
+from app.quality.proof import queries as proof
 from app.settings import Settings
 from app.views.reports import queries
-from app.views.reports.maker import NAME
+from app.views.reports.maker import NAME, PROVED
 
 log = logging.getLogger(__name__)
 
@@ -140,7 +141,7 @@ class ReportWorker:
             encoding="utf-8",
         )
         assert maker.stdin is not None
-        maker.stdin.write(f"{self._settings}\n")
+        maker.stdin.write(f"{self._settings}\n{PROVED if proof.passed() else ''}\n")
         return maker
 
     def _end(self) -> int | None:
