@@ -34,6 +34,10 @@ def test_no_plan_holds_for_an_alarm_that_none_is_for() -> None:
     assert most_specific([(Scope("d40"), "seat")], Trouble(None, "silent")) is None
 
 
+def test_a_run_rule_says_more_than_the_kind_of_its_alarms() -> None:
+    assert most_specific([(Scope(kind="signal"), "kind"), (Scope(rule="nelson_1"), "rule")], SEAT) == "rule"
+
+
 def test_causes_come_by_frequency_and_those_without_last() -> None:
     shares = pareto(
         [

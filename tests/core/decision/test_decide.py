@@ -2,7 +2,7 @@ from collections.abc import Callable
 from math import copysign
 
 import pytest
-from hypothesis import given
+from hypothesis import example, given
 from hypothesis import strategies as st
 
 from app.core.decision.decide import LoopState, ReadingAlarm, decide, outstanding_effect
@@ -25,6 +25,7 @@ def test_the_average_never_leaves_the_range_of_its_inputs(deviations: list[float
 
 
 @given(sizes, sizes, factors)
+@example(3e-05, 3e-05, 3.0)  # 2.9999999999999997e-05 by the formula
 def test_the_average_lies_between_the_old_one_and_the_deviation(old: float, deviation: float, k: float) -> None:
     assert min(old, deviation) <= average_of(old, deviation, k) <= max(old, deviation)
 
@@ -157,6 +158,10 @@ def test_beyond_max_total_the_tool_is_not_corrected_any_more(shaft: Made) -> Non
     assert back.action is Action.CORRECT
     lowered = decide(parameters, LoopState(total=-0.05), -0.0061)
     assert lowered.action is Action.CORRECT, "towards zero is allowed even from beyond"
+    across = decide(parameters, LoopState(total=-0.03), -0.06)
+    assert across.action is Action.CORRECT, "and through it, as long as it ends no further away"
+    further = decide(parameters, LoopState(total=-0.03), -0.060001)
+    assert further.code is Code.OFFSET_LIMIT
 
 
 def test_what_max_total_refuses_leaves_the_average_as_without_a_correction(shaft: Made) -> None:

@@ -84,5 +84,11 @@ def test_an_offset_that_somebody_has_set_is_not_corrected() -> None:
         assert (made.action, made.code) == (Action.NONE, Code.OFFSET_BY_HAND)
 
 
+def test_a_jump_after_that_is_reported_and_says_nothing_to_the_average() -> None:
+    made = decide(LENGTH, LoopState(0.002), -0.007, by_hand=True, jump=True)
+    assert (made.action, made.code, made.average_after) == (Action.NONE, Code.IMPLAUSIBLE, 0.002)
+    assert ReadingAlarm.IMPLAUSIBLE in made.alarms
+
+
 def test_a_tool_that_is_only_measured_is_judged_by_its_size_alone() -> None:
     assert not replace(LENGTH, mode=Mode.MEASURE_ONLY).rules.of_tool
