@@ -1,20 +1,24 @@
 """The readings in a file of a measuring machine: CSV, XLSX, NDJSON, a text protocol, or AQDEF. Nothing is moved or sent here.
 
 A file is taken whole or not at all: one line that cannot be read is a `Fault`, and a person puts the file right. Each reading has
-a key for ever. It is a hash of the file up to its line and of its own fields: the same file delivered again, or one that
-has grown since, brings nothing twice. Readings without time, part and key of their own are distinguished by the file's name and
-its time of modification too.
+a key for ever. With a time of its own a reading is known by that, by characteristic, size and part, and like ones by their
+place among each other: the same file again, one that has grown, one with the newest line first, and a window that rolls bring
+nothing twice. Without a time it is a hash of the file up to its line and of its own fields, and without part and key too the
+file's name and its time of modification tell it apart.
 """
 
 import hashlib
 import io
 import json
+from collections import Counter
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, field
+from datetime import UTC, datetime
+from itertools import pairwise
 from math import isfinite
 from pathlib import Path
-from typing import Any, Final, NamedTuple
+from typing import Any, Final, NamedTuple, cast
 
 from app.bridge.configuration import Machine
 from app.bridge.fields import EVERY, FIELDS, TEMPERATURES, Form, put
@@ -141,6 +145,33 @@ def _nothing_found(settings: Settings) -> str:
     return "The file holds no readings."
 
 
+_TIMES: Final = ("measured_at", "machined_at")
+
+
+def _meant(body: Mapping[str, Any]) -> str:
+    """The meaning of a reading that has a time: where it stands, a remark beside it and the number of its row may change."""
+    said = [_moment(body, (name,)) for name in _TIMES]
+    return json.dumps([body["characteristic"], float(body["measured"]), body.get("part"), *map(str, said)])
+
+
+def _moment(body: Mapping[str, Any], names: tuple[str, ...] = _TIMES) -> datetime | None:
+    return next((datetime.fromisoformat(body[name]).astimezone(UTC) for name in names if name in body), None)
+
+
+def _oldest_first(entries: list[Entry]) -> list[Entry]:
+    """The readings in their order, but by their times where the newest of each characteristic stands first."""
+    times: dict[str, list[datetime]] = {}
+    for entry in entries:
+        if (at := _moment(entry.body)) is None:
+            return entries
+        times.setdefault(entry.body["characteristic"], []).append(at)
+    pairs = [pair for each in times.values() for pair in pairwise(each)]
+    if any(one < two for one, two in pairs) or not any(one > two for one, two in pairs):
+        return entries
+    upwards = entries[::-1]  # like times stay in this order
+    return sorted(upwards, key=lambda entry: cast("datetime", _moment(entry.body)))
+
+
 class _Reader:
     def __init__(
         self,
@@ -166,6 +197,7 @@ class _Reader:
         self.remarks = Repeats()
         self.left_out: dict[str, Repeats] = {}
         self.nominal: dict[str, tuple[int, str]] = {}
+        self.alike: Counter[str] = Counter()
         if earlier is not None and earlier[0] in self.prefix:
             content.stamp = earlier[1]
 
@@ -193,6 +225,7 @@ class _Reader:
                 self._text()
             case "aqdef":
                 self._aqdef()
+        self.content.entries = _oldest_first(self.content.entries)
         self.content.remarks = self.remarks.sentences()
         self.content.left_out = {name: "; ".join(each.sentences()) for name, each in self.left_out.items()}
 
@@ -448,13 +481,17 @@ class _Reader:
             self.content.entries.append(Entry(line, name, body, alone))
             return
         if own is not None:
-            parts = [own, name]
+            place, parts = "own", [own, name]
+        elif body.keys() & set(_TIMES):
+            place, parts = "at", [_meant(body)]
+            self.alike[parts[0]] += 1
+            parts.append(str(self.alike[parts[0]]))
         else:
+            place = str(line)
             parts = [self.prefix[line], name, json.dumps(dict(raw), sort_keys=True, default=str)]
-            if not body.keys() & {"measured_at", "machined_at", "part"}:
+            if "part" not in body:
                 parts.append(self.content.stamp)
         digest = hashlib.sha256("\0".join(parts).encode("utf-8", "replace")).hexdigest()[:32]
-        place = "own" if own is not None else str(line)
         self.content.entries.append(Entry(line, name, body, f"{self.machine.key}:{place}:{digest}"))
 
     def _nobody(self, line: int, name: str) -> None:
