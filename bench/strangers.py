@@ -3,8 +3,8 @@
 Sixteen machines send a reading every 200 ms, one after the other. Nobody else is there, then, each after an idle time of its
 own: 1,000 connections that are silent or keep half a head back, bodies that come ten bytes at a time, guesses of keys, passwords
 and badges, two imports one after the other without end, 20 requests for reports, and three times all of them. The next idle time
-begins when all reports are made. Everything is bounded in number and time and goes to this computer only; the strangers run at a
-lower priority, as they would use processors of their own.
+begins when all reports are made. Everything is bounded in number and time and goes to this computer only; the strangers get
+what time the processors have left, as they would use others of their own.
 
 ``python -m bench.strangers [--seconds 20]`` ends with 1 where the ratio is 5 or more.
 """
@@ -110,7 +110,7 @@ class Strangers:
             ("imports", self.bring, IMPORTERS),
             ("reports", self.ask, REPORTS),
         ]
-        kinds = [(what, many) for name, what, many in everyone if which in {name, "all"}]
+        kinds = [(what, many) for name, what, many in everyone if which == "all" or name in which.split(",")]
         everybody = [asyncio.create_task(self.again(what, number)) for what, many in kinds for number in range(many)]
         await asyncio.sleep(seconds)
         for each in everybody:
@@ -271,7 +271,10 @@ def main(seconds: float) -> int:
 
 
 async def load(url: str, which: str, seconds: float) -> None:
-    os.nice(5)
+    if hasattr(os, "SCHED_IDLE"):
+        os.sched_setscheduler(0, os.SCHED_IDLE, os.sched_param(0))
+    else:
+        os.nice(5)
     engineer, tablet, file = json.loads(sys.stdin.read())
     strangers = Strangers(url, engineer, tuple(tablet), file)
     print("begun", flush=True)
