@@ -28,7 +28,7 @@ from app.jobs.runner import JobRunner
 from app.language.times import use_zone
 from app.loop.calibration import jobs
 from app.loop.connections import jobs as connection_jobs
-from app.loop.connections import server_away
+from app.loop.connections import late_readings, server_away
 from app.loop.control_plan import jobs as control_plan_jobs
 from app.loop.faults.actions import report_touch_count
 from app.loop.machines.keys import caller_of_key
@@ -155,7 +155,8 @@ JOBS: tuple[PeriodicJob, ...] = (
 def jobs_of(settings: Settings) -> tuple[PeriodicJob, ...]:
     """All of them, as the settings have it."""
     untaken = Watch(settings.corrections_taken_within, settings.corrections_not_taken_most)
-    return server_away.JOB, *JOBS, connection_jobs.job(settings.bridge_silent_after), untaken.job()
+    away = (server_away.JOB, connection_jobs.job(settings.bridge_silent_after), late_readings.JOB)
+    return *away, *JOBS, untaken.job()
 
 
 NOT_COMPRESSED = (

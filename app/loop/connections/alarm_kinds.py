@@ -96,5 +96,23 @@ SERVER_AWAY = register(
         outcomes={"server_back": lambda item: _late(_("The server is reachable again."), item)},
     )
 )
+READINGS_LATE = register(
+    AlarmKind(
+        "readings_late",
+        concerns_parts=True,
+        word=lambda: _("Readings came late"),
+        sentence=lambda alarm: ngettext(
+            "{n} reading came late: it was measured from {begin} to {end}. Parts were cut without its correction.",
+            "{n} readings came late: measured from {begin} to {end}. Parts were cut without their corrections, and no stop came.",
+            int(alarm.data.get("late") or 0),
+        ).format(n=alarm.data.get("late"), begin=_since(alarm, "from"), end=_since(alarm, "until")),
+        what_to_do=lambda: _(
+            "Look at the parts of that time, and at the network between the machine and this server. Readings that are typed in later "
+            "carry by_hand."
+        ),
+        icon="no_data",
+        comments={"noted": lambda: [_("Network repaired"), _("Parts looked at")]},
+    )
+)
 GONE = {BRIDGE_SILENT.name: "bridge_heard", BRIDGE_BACKING_UP.name: "backlog_gone"}
 """The outcome of each when it ends by itself."""

@@ -7,7 +7,7 @@ import psycopg
 from sqlalchemy import text
 
 from app.jobs.actions import run_jobs
-from app.loop.connections import server_away
+from app.loop.connections import late_readings, server_away
 from app.loop.connections.jobs import due, job
 from tests.conftest import Server
 from tests.loop.connections.test_heartbeat import ago, beat
@@ -197,3 +197,61 @@ def test_a_silence_that_is_over_says_how_many_readings_came_late(shop: Shop) -> 
     run(shop)
     [outcome] = shop.call("GET", f"/alarms/{alarm['id']}")["outcome"]
     assert outcome["text"] == "The bridge has spoken again. 7 readings came late, and their decisions with them."
+
+
+def looked_for_late(shop: Shop) -> None:
+    """Look for readings that came late in the last minutes."""
+    with shop.server.database.begin() as session:
+        session.execute(text("DELETE FROM job_run WHERE job = 'late_readings'"))
+        session.execute(text("INSERT INTO job_run VALUES ('late_readings', now() - interval '2 minutes', 0, 1)"))
+        for unit in late_readings.due(session):
+            if f"/{shop.machine}/" in unit.subject:
+                late_readings.tell(session, unit)
+                late_readings.tell(session, unit)
+        session.execute(text("DELETE FROM job_run WHERE job = 'late_readings'"))
+
+
+def came_in_time(shop: Shop, minutes: int) -> None:
+    """Let the readings so far have come that long ago, when they were measured."""
+    with psycopg.connect(shop.server.database.dsn) as connection:
+        connection.execute("SET session_replication_role = replica")  # else it is refused: a reading is a fact
+        connection.execute(
+            "UPDATE reading SET received_at = now() - make_interval(mins => %s), measured_at = now() - make_interval(mins => %s)"
+            " WHERE machine_id = (SELECT id FROM machine WHERE key = %s)",
+            [minutes, minutes, shop.machine],
+        )
+
+
+def test_readings_of_a_machine_whose_network_failed_say_so(shop: Shop) -> None:
+    shop.read(0)
+    came_in_time(shop, 50)
+    shop.push([0.0] * 4, measured_at=[ago(minutes=40 - 10 * n) for n in range(4)])
+    looked_for_late(shop)
+    [alarm] = shop.alarms()
+    assert (alarm["kind"], alarm["count"]) == ("readings_late", 1)
+    assert alarm["text"].startswith("4 readings came late: measured from ")
+    looked_for_late(shop)
+    assert shop.call("GET", f"/alarms/{alarm['id']}")["count"] == 1
+
+
+def test_a_clock_that_is_behind_and_sizes_by_hand_are_no_network_that_failed(server: Server) -> None:
+    behind, by_hand = Shop(server), Shop(server)
+    behind.push([0.0] * 3, measured_at=[ago(minutes=60 - n) for n in range(3)])
+    by_hand.read(0)
+    came_in_time(by_hand, 50)
+    by_hand.push([0.0] * 2, measured_at=[ago(minutes=30), ago(minutes=20)], context=[{"by_hand": True}] * 2)
+    for shop in (behind, by_hand):
+        looked_for_late(shop)
+        assert shop.alarms() == []
+
+
+def test_what_a_silent_bridge_says_is_said_once(shop: Shop) -> None:
+    shop.read(0)
+    came_in_time(shop, 50)
+    beat(shop)
+    silent_for(shop, 40)
+    run(shop)
+    beat(shop)
+    shop.push([0.0] * 2, measured_at=[ago(minutes=30), ago(minutes=20)])
+    looked_for_late(shop)
+    assert kinds(shop) == ["bridge_silent"]
