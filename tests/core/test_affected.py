@@ -4,7 +4,7 @@ import random
 
 import pytest
 
-from app.core.affected import Cut, names_between, stretches, verdict_of
+from app.core.affected import MOST_NAMED, Cut, names_between, stretches, verdict_of
 from app.core.natural import Tolerance
 
 LIMITS = Tolerance(-0.008, 0.008)
@@ -126,3 +126,10 @@ def test_hand_decides_before_the_probe_and_a_guard_narrows() -> None:
 def test_names_between_keep_their_zeros() -> None:
     assert names_between("0812/9", "0812/11") == ("0812/10",)
     assert names_between("same", "same") is None
+
+
+def test_names_between_are_said_one_by_one_up_to_their_most() -> None:
+    named = names_between("P1", f"P{MOST_NAMED + 2}")
+    assert isinstance(named, tuple)
+    assert (len(named), named[-1]) == (MOST_NAMED, f"P{MOST_NAMED + 1}")
+    assert names_between("P1", f"P{MOST_NAMED + 3}") == MOST_NAMED + 1

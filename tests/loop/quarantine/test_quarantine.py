@@ -6,6 +6,8 @@ import re
 from datetime import UTC, datetime, timedelta
 from typing import Any
 
+import psycopg
+
 from tests.conftest import Server
 from tests.shop import Person, Shop
 
@@ -28,6 +30,15 @@ def affected(shop: Shop, alarm: int, query: str = "") -> Any:
 
 def names(found: Any) -> list[Any]:
     return [part["part"] for each in found["stretches"] for part in each["parts"]]
+
+
+def states(server: Server, number: int) -> list[str]:
+    """What live pages heard of a quarantine."""
+    with psycopg.connect(server.database.dsn) as connection:
+        events = [
+            change for (changes,) in connection.execute("SELECT changes FROM event ORDER BY id") for change in changes
+        ]
+    return [each["state"] for each in events if (each["kind"], each.get("id")) == ("quarantine", number)]
 
 
 def worn(shop: Shop) -> int:
@@ -174,12 +185,26 @@ def test_parts_are_set_aside_and_decided_one_by_one(shop: Shop, server: Server) 
     assert bad["status"] == "scrapped"
     assert shop.call("GET", here)["state"] == "open"
     shop.call("POST", f"{here}/parts/4/scrap", client=operator, reason="Out of tolerance")
+    assert states(server, made["id"])[-2:] == ["open", "closed"], "live pages hear of the last decision"
     assert (shop.call("GET", here)["state"], shop.call("GET", here)["scrapped"]) == ("closed", 2)
     assert shop.call("GET", f"/quarantines?state=open&machine={shop.machine}")["items"] == []
     assert len(shop.call("GET", f"/quarantines?machine={shop.machine}")["items"]) == 1
     shop.call("POST", f"{here}/parts/5/scrap", 404, reason="Bad")
     entries = shop.call("GET", f"/audit?subject=quarantine/{made['id']}/2")["items"]
     assert entries[0]["why"] == "Micrometer"
+
+
+def test_a_part_that_is_decided_stays_as_it_was_decided(shop: Shop) -> None:
+    asked: dict[str, Any] = {"alarm": worn(shop), "reason": "Edge broken"}
+    here = f"/quarantines/{shop.call('POST', '/quarantines', 201, **asked)['id']}"
+    shop.call("POST", f"{here}/parts/2/scrap", reason="Looks bad")
+    cut(shop, 19.0, 6, "SN-0006")
+    again = shop.call("POST", "/quarantines", 200, **asked)
+    assert [(part["part"], part["found"], part["status"]) for part in again["parts"]] == [
+        ("SN-0005", "not_measured", "open"),
+        ("SN-0006", "not_measured", "scrapped"),
+        ("SN-0007", "bad", "open"),
+    ]
 
 
 def test_quarantine_is_handed_on_as_a_file(shop: Shop) -> None:
