@@ -5,7 +5,7 @@ from datetime import datetime
 from typing import Any
 
 from app.language.i18n import _, ngettext
-from app.language.numbers import as_read
+from app.language.numbers import NOTHING, as_read
 from app.loop.alarms.kinds import AlarmKind, register
 from app.loop.tables.alarms import Alarm
 
@@ -82,6 +82,30 @@ BRIDGE_BACKING_UP = register(
         outcomes={"backlog_gone": lambda _item: _("The backlog is gone.")} | _REMOVED,
     )
 )
+BRIDGE_QUARANTINE = register(
+    AlarmKind(
+        "bridge_quarantine",
+        concerns_parts=True,
+        word=lambda: _("Readings in quarantine"),
+        sentence=lambda alarm: ngettext(
+            "{n} reading was refused and lies in the bridge: nothing is decided by it. The newest is {key} of {characteristic}: {reason}",
+            "{n} readings were refused and lie in the bridge: nothing is decided by them. The newest is {key} of {characteristic}: "
+            "{reason}",
+            int(alarm.data.get("quarantined") or 0),
+        ).format(
+            n=alarm.data.get("quarantined"),
+            key=alarm.data.get("newest") or NOTHING,
+            characteristic=alarm.data.get("characteristic") or NOTHING,
+            reason=alarm.data.get("reason") or NOTHING,
+        ),
+        what_to_do=lambda: _(
+            "Look at the page of the connection for why. Then send them again or drop them: inband bridge quarantine. The alarm ends "
+            "when none is left."
+        ),
+        comments={"noted": lambda: [_("Characteristic added"), _("Program corrected"), _("Sent again")]},
+        outcomes={"quarantine_empty": lambda _item: _("The quarantine is empty.")} | _REMOVED,
+    )
+)
 SERVER_AWAY = register(
     AlarmKind(
         "server_away",
@@ -114,5 +138,9 @@ READINGS_LATE = register(
         comments={"noted": lambda: [_("Network repaired"), _("Parts looked at")]},
     )
 )
-GONE = {BRIDGE_SILENT.name: "bridge_heard", BRIDGE_BACKING_UP.name: "backlog_gone"}
+GONE = {
+    BRIDGE_SILENT.name: "bridge_heard",
+    BRIDGE_BACKING_UP.name: "backlog_gone",
+    BRIDGE_QUARANTINE.name: "quarantine_empty",
+}
 """The outcome of each when it ends by itself."""

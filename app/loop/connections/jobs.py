@@ -1,4 +1,4 @@
-"""Periodic job of connections: a bridge that is silent or backs up raises an alarm, and the alarm ends when that is over.
+"""Periodic job of connections: a bridge that is silent, backs up or has a quarantine raises an alarm, which ends when that is over.
 
 An alarm that somebody has acknowledged is not raised again for the same silence or the same backlog.
 """
@@ -17,7 +17,7 @@ from app.jobs.actions import PeriodicJob, Unit
 from app.language.i18n import _
 from app.loop.alarms import actions as alarms
 from app.loop.alarms.kinds import kind_named
-from app.loop.connections.alarm_kinds import BRIDGE_BACKING_UP, BRIDGE_SILENT, GONE
+from app.loop.connections.alarm_kinds import BRIDGE_BACKING_UP, BRIDGE_QUARANTINE, BRIDGE_SILENT, GONE
 from app.loop.connections.queries import came_late
 from app.loop.machines.queries import lock_machines
 from app.loop.tables.alarms import Alarm
@@ -81,7 +81,12 @@ def _late(session: Session, machine: Machine, name: str) -> dict[str, int]:
 
 def _values(connection: Connection) -> dict[str, Any]:
     oldest = connection.oldest_waiting_at
+    newest = connection.quarantine[0] if connection.quarantine else {}
     return {
+        "quarantined": connection.quarantined,
+        "newest": newest.get("key"),
+        "characteristic": newest.get("characteristic"),
+        "reason": newest.get("reason"),
         "received_at": connection.received_at.isoformat(),
         "state": connection.state,
         "waiting": connection.waiting,
@@ -101,7 +106,17 @@ def _due(session: Session, silent_after: timedelta) -> Select[Any]:
     cases: list[Select[int, str, str, str]] = [
         _over(BRIDGE_SILENT.name, ~silent),
         _over(BRIDGE_BACKING_UP.name, Connection.backing_up_since.is_(None)),
-        _begun(BRIDGE_BACKING_UP.name, Connection.backing_up_since.is_not(None), Connection.backing_up_since),
+        _begun(
+            BRIDGE_BACKING_UP.name,
+            Connection.backing_up_since.is_not(None),
+            _since(Connection.backing_up_since),
+        ),
+        _over(BRIDGE_QUARANTINE.name, Connection.quarantined == 0),
+        _begun(
+            BRIDGE_QUARANTINE.name,
+            Connection.quarantined > 0,
+            Alarm.data["newest"].astext.is_not_distinct_from(Connection.quarantine[0]["key"].astext),
+        ),
     ]
     if heard_since is not None:
         lately = func.clock_timestamp() - LATELY < heard_since
@@ -109,19 +124,25 @@ def _due(session: Session, silent_after: timedelta) -> Select[Any]:
             _begun(
                 BRIDGE_SILENT.name,
                 and_(silent, lately, Connection.received_at < heard_since),
-                Connection.received_at,
+                _since(Connection.received_at),
             )
         )
     every = union_all(*cases).subquery()
     return select(every).order_by(every.c.id, every.c.kind)
 
 
-def _begun(name: str, condition: ColumnElement[bool], since: Any) -> Select[int, str, str, str]:
+def _since(moment: Any) -> ColumnElement[bool]:
+    """An alarm is about what goes on since this moment."""
+    since: ColumnElement[bool] = (Alarm.raised_at >= moment) | Alarm.acknowledged_at.is_(None)
+    return since
+
+
+def _begun(name: str, condition: ColumnElement[bool], said: ColumnElement[bool]) -> Select[int, str, str, str]:
     raised = select(Alarm.id).where(
         Alarm.machine_id == Connection.machine_id,
         Alarm.characteristic_id.is_(None),
         Alarm.kind == name,
-        (Alarm.raised_at >= since) | Alarm.acknowledged_at.is_(None),
+        said,
     )
     return (
         select(Machine.id, Machine.key.label("machine"), value(name).label("kind"), value("raise").label("verb"))

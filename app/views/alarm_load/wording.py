@@ -38,6 +38,7 @@ def made_by(kind: str) -> str:
         "signal": _("run rule"),
         "bridge_silent": _("INBAND_BRIDGE_SILENT_AFTER"),
         "bridge_backing_up": _("INBAND_BRIDGE_BACKLOG_AFTER"),
+        "bridge_quarantine": _("refusal of readings"),
         "readings_late": _("network of the machine"),
         "server_away": _("server or database"),
         "touch_count": _("points and repeats"),

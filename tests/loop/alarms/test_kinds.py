@@ -86,6 +86,9 @@ DATA: dict[str, list[dict[str, Any]]] = {
     "tool_life": [{"by": "parts", "parts": 520, "planned_parts": 500}, {"total": 0.21, "planned_total": 0.2}],
     "bridge_silent": [{"received_at": _AT}],
     "server_away": [{"from": _AT, "until": _AT}],
+    "bridge_quarantine": [
+        {"quarantined": n, "newest": "p-1", "characteristic": "seat", "reason": "Key is taken."} for n in (1, 4)
+    ],
     "readings_late": [{"from": _AT, "until": _AT, "late": 24}],
     "bridge_backing_up": [{"state": "full", "waiting": 900}, {"waiting": 900, "oldest_waiting_at": _AT}],
     "machine_fault": [{"location": which} for which in ("battery_low", "receiver", "probe_not_ready", "other")],

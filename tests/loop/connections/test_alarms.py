@@ -255,3 +255,29 @@ def test_what_a_silent_bridge_says_is_said_once(shop: Shop) -> None:
     shop.push([0.0] * 2, measured_at=[ago(minutes=30), ago(minutes=20)])
     looked_for_late(shop)
     assert kinds(shop) == ["bridge_silent"]
+
+
+def refused(*keys: str) -> list[dict[str, Any]]:
+    return [
+        {"key": key, "characteristic": "bore", "reason": "No such characteristic.", "at": ago(minutes=1)}
+        for key in keys
+    ]
+
+
+def test_a_quarantine_raises_an_alarm_that_ends_when_it_is_empty(shop: Shop) -> None:
+    beat(shop, quarantined=1, quarantine=refused("p-1"))
+    run(shop)
+    [alarm] = shop.alarms()
+    assert alarm["kind"] == "bridge_quarantine"
+    assert alarm["text"].endswith("The newest is p-1 of bore: No such characteristic.")
+    shop.acknowledge(alarm["id"], "noted")
+    run(shop)
+    assert shop.alarms() == [], "answered"
+    beat(shop, quarantined=2, quarantine=refused("p-2", "p-1"))
+    run(shop)
+    [alarm] = shop.alarms()
+    assert alarm["text"].startswith("2 readings were refused")
+    beat(shop)
+    run(shop)
+    ended = shop.call("GET", f"/alarms/{alarm['id']}")
+    assert (ended["state"], ended["outcome"][0]["code"]) == ("acknowledged", "quarantine_empty")
