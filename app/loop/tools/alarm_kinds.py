@@ -131,31 +131,21 @@ EARLY_EFFECT = register(
 
 def _in_doubt(alarm: Alarm) -> str:
     data = alarm.data
-    text = {
-        "fell": _(
+    if data["why"] == "fell":
+        fell = {
+            "held": _("it is held"),
+            "awaiting_approval": _("it awaits approval"),
+            "rejected": _("it was rejected"),
+        }.get(str(data.get("status")), _("it has fallen"))
+        return _(
             "Correction {number} cannot be in effect, as a reading of {characteristic} says: {fell}. If the control has added "
             "it to tool {of_tool} all the same, the offset differs from what Inband counts."
-        ),
-        "not_issued": _(
-            "A reading of {characteristic} names correction {number}, which was issued after its part was cut: at {issued_at}, the "
-            "part by machined_at at {machined_at}. Either the clock of the machine is behind, or the number is not that of the part."
-        ),
-    }.get(
-        str(data.get("why")),
-        _(
-            "A reading of {characteristic} confirms corrections of tool {tool} by {number}, of tool {of_tool}. That is right only where "
-            "the machine applies the corrections of all tools in the order of their numbers."
-        ),
-    )
-    fell = {
-        "held": _("it is held"),
-        "awaiting_approval": _("it awaits approval"),
-        "rejected": _("it was rejected"),
-    }.get(str(data.get("status")), _("it has fallen"))
-    moments = {
-        name: as_read(datetime.fromisoformat(data[name])) for name in ("machined_at", "issued_at") if name in data
-    }
-    return text.format(**data | moments, fell=fell, tool=alarm.tool_memory)
+        ).format(**data, fell=fell)
+    moments = {name: as_read(datetime.fromisoformat(data[name])) for name in ("machined_at", "issued_at")}
+    return _(
+        "A reading of {characteristic} names correction {number}, which was issued after its part was cut: at {issued_at}, the "
+        "part by machined_at at {machined_at}. Either the clock of the machine is behind, or the number is not that of the part."
+    ).format(**data | moments)
 
 
 CORRECTION_IN_DOUBT = register(
@@ -174,7 +164,6 @@ CORRECTION_IN_DOUBT = register(
                 _("Program that sends the number corrected"),
                 _("Clock set"),
                 _("Offset at the control is right"),
-                _("All tools take corrections in the order of their numbers"),
             ]
         },
     )

@@ -61,20 +61,13 @@ def test_a_part_that_was_cut_before_it_was_issued(shop: Shop) -> None:
     assert "the clock of the machine is behind" in alarm["text"]
 
 
-def test_the_number_of_another_tool_that_confirms(shop: Shop) -> None:
+def test_numbers_of_all_tools_are_one_order(shop: Shop) -> None:
     other = shop.another("bore", tool_memory=7, average_memory=7)
     own = issued(shop)
     number = shop.read(6, other)["correction"]["number"]
     shop.read(0.5, correction_in_effect=number)
     assert shop.correction(own)["status"] == "applied"
-    (alarm,) = doubts(shop)
-    assert f"confirms corrections of tool 3 by {number}, of tool 7" in alarm["text"]
-    shop.acknowledge(alarm["id"], "noted")
-    own = shop.read(6, correction_in_effect=number)["correction"]["number"]
-    number = shop.read(20, other)["correction"]["number"]
-    shop.read(0.5, correction_in_effect=number)
-    assert shop.correction(own)["status"] == "applied"
-    assert doubts(shop) == [], "answered for this tool"
+    assert doubts(shop, "all") == []
 
 
 @pytest.mark.parametrize("batch", [False, True])

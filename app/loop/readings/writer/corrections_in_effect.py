@@ -126,10 +126,10 @@ def confirms(pending: PendingWrites, tool: PendingTool | None, in_effect: int | 
 
 def confirm(
     pending: PendingWrites, stream: PendingStream, tool: PendingTool | None, in_effect: int | None, at: datetime
-) -> bool:
-    """Apply this tool's pending corrections up to `in_effect`, which the machine says it cut with; tell if there are any."""
+) -> None:
+    """Apply this tool's pending corrections up to `in_effect`, which the machine says it cut with."""
     if tool is None or in_effect is None or not confirms(pending, tool, in_effect):
-        return False
+        return
     last = pending.named_correction(tool.machine_id, in_effect)
     for place, issued in enumerate(tool.corrections):
         if issued.status != "pending" or not _took_effect(issued, in_effect, last):
@@ -158,7 +158,6 @@ def confirm(
         )
         pending.touched_machines.add(tool.machine_id)
     tool.forget()
-    return True
 
 
 def issued_total(pending: PendingWrites, tool: PendingTool | None) -> float:

@@ -89,7 +89,7 @@ def decide_reading(pending: PendingWrites, entry: Entry, reading: ReadingIn, now
     _refuse_unissued(pending, entry, in_effect)
     sequence = stream.sequence + 1
     measured_at = now if reading.measured_at is None else reading.measured_at.astimezone(UTC)
-    confirmed = confirm(pending, stream, tool, in_effect, min(now, reading.machined_at or measured_at))
+    confirm(pending, stream, tool, in_effect, min(now, reading.machined_at or measured_at))
     previous_tool, outstanding, amounts, compensated = corrections_in_effect(pending, tool, reading, parameters)
     average = stream.average
     empirical_value = average.empirical_value if average and not reading.is_by_hand else 0.0
@@ -124,7 +124,7 @@ def decide_reading(pending: PendingWrites, entry: Entry, reading: ReadingIn, now
         paused_by, decision = opposed, judged(state=state._replace(paused=True))
     alarms = [_signal(pending, stream, signal, sequence, decision, results, fault) for signal in decision.alarms]
     name_correction(alarms, stream, newest)
-    asked = doubt(pending, stream, reading, sequence, confirmed)
+    asked = doubt(pending, stream, reading, sequence)
     alarms += [alarm for alarm in (opposed, asked) if alarm is not None]
     correction = (
         _issue(pending, stream, tool, sequence, decision, now) if tool and decision.amount is not None else None

@@ -14,7 +14,6 @@ from app.loop.tables.tools import DOUBT
 
 LET_GO = ("pending", "applied")
 BEHIND = timedelta(minutes=1)  # that clocks of a machine and of the server may differ
-ANOTHER_TOOL = "another_tool"
 
 
 def fell(pending: PendingWrites, tool: PendingTool | None, number: int | None) -> bool:
@@ -23,10 +22,8 @@ def fell(pending: PendingWrites, tool: PendingTool | None, number: int | None) -
     return named is not None and named.status is not None and named.status not in LET_GO
 
 
-def doubt(
-    pending: PendingWrites, stream: PendingStream, reading: ReadingIn, sequence: int, confirms: bool
-) -> PendingAlarm | None:
-    """Return the alarm that asks about the number of a reading, or None. confirms: it applies pending corrections of its tool."""
+def doubt(pending: PendingWrites, stream: PendingStream, reading: ReadingIn, sequence: int) -> PendingAlarm | None:
+    """Return the alarm that asks about the number of a reading, or None."""
     tool, number = stream.tool, reading.correction_in_effect
     named = None if tool is None or number is None else pending.named_correction(tool.machine_id, number)
     if tool is None or named is None or named.status is None:
@@ -44,8 +41,6 @@ def doubt(
             "machined_at": reading.machined_at.isoformat(),
             "issued_at": named.issued_at.isoformat(),
         }
-    elif confirms and named.tool_memory != tool.number:
-        data["why"] = ANOTHER_TOOL
     else:
         return None
     data["of_tool"] = named.tool_memory
@@ -72,7 +67,7 @@ def follow_statuses(pending: PendingWrites, tool: PendingTool) -> None:
 def leave_out_answered(pending: PendingWrites, answered: Iterable[tuple[int, int, str, int]]) -> None:
     """Drop doubts that somebody has answered. answered: machine, tool, why and number of each."""
     known = set(answered)
-    gone = {id(alarm) for alarm in doubts(pending) if known & _keys(alarm)}
+    gone = {id(alarm) for alarm in doubts(pending) if _key(alarm) in known}
     if gone:
         pending.raised = [alarm for alarm in pending.raised if id(alarm) not in gone]
         for verdict in pending.verdicts:
@@ -84,7 +79,6 @@ def doubts(pending: PendingWrites) -> Iterator[PendingAlarm]:
     return (alarm for alarm in pending.raised if alarm.kind == DOUBT)
 
 
-def _keys(alarm: PendingAlarm) -> set[tuple[int, int, str, int]]:
-    """Keys of the doubts that an answer to this alarm settles. That all tools go by one order of numbers is said once for a tool."""
-    why, number = alarm.data["why"], 0 if alarm.data["why"] == ANOTHER_TOOL else alarm.data["number"]
-    return {(alarm.machine_id, alarm.tool_memory or 0, why, number)}
+def _key(alarm: PendingAlarm) -> tuple[int, int, str, int]:
+    """The doubt that an answer to this alarm settles."""
+    return alarm.machine_id, alarm.tool_memory or 0, alarm.data["why"], alarm.data["number"]
