@@ -284,7 +284,7 @@ class Settings(BaseSettings):
     )
     days_off: Annotated[str, AfterValidator(_dates)] = Field(
         default="",
-        description="Days on which the plant does not work, such as 2026-12-24,2026-12-31: for notifications.",
+        description="Days on which the plant does not work, such as 2026-12-24,2026-12-31: for notifications, beside those of Set-up.",
     )
 
     part_cost: float | None = Field(

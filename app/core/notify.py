@@ -1,13 +1,14 @@
 """Notifications of active alarms, to whom and when: routes, quiet hours, repetition, escalation, one message in place of a flood.
 
 A route names the alarms it is for and steps of receivers. A step begins some minutes after the alarm, or with the step before
-where nobody of that can be reached now: failing, away, or in quiet hours. A receiver gets at most one message in `GAP`, with everything that is due then.
+where nobody of that can be reached now: failing, away, in quiet hours, or nobody on duty. A receiver gets at most one message in `GAP`, with everything that is due then.
 """
 
 from collections import defaultdict
 from collections.abc import Container, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from datetime import date, datetime, time, timedelta, tzinfo
+from types import MappingProxyType
 from typing import NamedTuple
 
 GAP = timedelta(minutes=1)
@@ -31,21 +32,63 @@ class Hours:
 
     def hold(self, local: datetime, days_off: Container[date] = ()) -> bool:
         """Tell if a moment of the plant's clock lies in it. days_off: on them it does not begin."""
+        return bool(self.begun(local, days_off))
+
+    def begun(self, local: datetime, days_off: Container[date] = ()) -> list[date]:
+        """The days on which it began that hold the moment: two where it is longer than a day."""
         begun = [local.date()] if self.begins <= local.time() else []
         if self.ends <= self.begins:
             if local.time() < self.ends:
                 begun.append(local.date() - DAY)
         elif local.time() >= self.ends:
             begun.clear()
-        return any(day.isoweekday() in self.days and day not in days_off for day in begun)
+        return [day for day in begun if day.isoweekday() in self.days and day not in days_off]
+
+
+@dataclass(frozen=True, slots=True)
+class Turn:
+    """A part of a rota: these receivers are on duty in these hours, from the first day to the last, as they begin."""
+
+    receivers: tuple[int, ...]
+    hours: Hours
+    first: date | None = None
+    last: date | None = None
+
+    def holds(self, local: datetime) -> bool:
+        """Tell if they are on duty at this moment of the plant's clock."""
+        return any(
+            (self.first is None or self.first <= day) and (self.last is None or day <= self.last)
+            for day in self.hours.begun(local)
+        )
+
+
+@dataclass(frozen=True, slots=True)
+class Group:
+    """Receivers that are named together, and the rota by which some are on duty."""
+
+    members: tuple[int, ...]
+    turns: tuple[Turn, ...] = ()
+
+    def on_duty(self, local: datetime) -> tuple[int, ...]:
+        """Those on duty at this moment, in the order of the rota; empty: nobody."""
+        return tuple(dict.fromkeys(each for turn in self.turns if turn.holds(local) for each in turn.receivers))
 
 
 @dataclass(frozen=True, slots=True)
 class Step:
-    """Receivers, by number, that are notified of an alarm that is still active after this time."""
+    """Those who are notified of an alarm that is still active after this time: receivers, groups, who is on duty in groups."""
 
     after: timedelta
     receivers: tuple[int, ...]
+    groups: tuple[int, ...] = ()
+    on_duty: tuple[int, ...] = ()
+
+    def whom(self, groups: Mapping[int, Group], local: datetime) -> list[int]:
+        """The receivers at this moment of the plant's clock, each once."""
+        found = [*self.receivers]
+        found += (each for number in self.groups if number in groups for each in groups[number].members)
+        found += (each for number in self.on_duty if number in groups for each in groups[number].on_duty(local))
+        return list(dict.fromkeys(found))
 
 
 @dataclass(frozen=True, slots=True)
@@ -152,6 +195,7 @@ def notices(
     now: datetime,
     zone: tzinfo,
     days_off: Container[date] = (),
+    groups: Mapping[int, Group] = MappingProxyType({}),
 ) -> list[Notice]:
     """Messages that are due now, at most one for each receiver.
 
@@ -165,7 +209,7 @@ def notices(
         if not route.is_open(local, days_off):
             continue
         for alarm in filter(route.concerns, alarms):
-            for number, begun in _begun(route, receivers, alarm, now, local).items():
+            for number, begun in _begun(route, receivers, groups, alarm, now, local).items():
                 receiver = receivers[number]
                 at = _due_at(route, receiver, alarm, begun, record)
                 if at is not None and at <= now and receiver.listens(now, local, urgent=route.urgent):
@@ -179,9 +223,17 @@ def notices(
 
 
 def _begun(
-    route: Route, receivers: Mapping[int, Receiver], alarm: Raised, now: datetime, local: datetime
+    route: Route,
+    receivers: Mapping[int, Receiver],
+    groups: Mapping[int, Group],
+    alarm: Raised,
+    now: datetime,
+    local: datetime,
 ) -> dict[int, datetime]:
-    """The receivers of the steps that have begun, and since when; a step after such as cannot be reached begins with theirs."""
+    """The receivers of the steps that have begun, and since when; a step after such as cannot be reached begins with theirs.
+
+    Of a group in which nobody is on duty there is nobody who can be reached.
+    """
     begun: dict[int, datetime] = {}
     unreached = False
     since = alarm.at
@@ -190,7 +242,7 @@ def _begun(
             since = alarm.at + step.after
             if since > now:
                 break
-        known = [number for number in step.receivers if number in receivers]
+        known = [number for number in step.whom(groups, local) if number in receivers]
         for number in known:
             begun.setdefault(number, since)
         reachable = (receivers[number].listens(now, local, urgent=route.urgent) for number in known)

@@ -75,6 +75,11 @@ def in_zone(zone: ZoneInfo) -> Iterator[None]:
         _chosen.reset(token)
 
 
+def plant_shifts() -> Sequence[time]:
+    """Beginnings of the shifts of the plant, by its clock."""
+    return _time().shifts
+
+
 def local(at: datetime) -> datetime:
     """The moment in the zone of the plant."""
     return at.astimezone(plant_zone())

@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from app.core.notify import GAP, Hours, Notice, Raised, Receiver, Record, Route, Step, notices
+from app.core.notify import GAP, Group, Hours, Notice, Raised, Receiver, Record, Route, Step, Turn, notices
 from tests.chance import examples
 
 NOON = datetime(2026, 11, 26, 12, tzinfo=UTC)  # a Thursday
@@ -230,3 +230,31 @@ def test_whatever_comes(routes: list[Route], drawn: list[tuple[datetime, int | N
     if not any(each.repeat for each in routes):
         told = [(notice.receiver, number) for _at, notice in sent for number in notice.alarms]
         assert len(told) == len(set(told)), "once"
+
+
+class TestGroups:
+    EARLY, LATE = Hours(EVERY_DAY, time(6), time(14)), Hours(EVERY_DAY, time(14), time(22))
+    SETTERS = Group((1, 2), (Turn((1,), EARLY), Turn((2,), LATE, first=date(2026, 11, 26))))
+
+    def named(self, now: datetime, *steps: Step, **of_first: object) -> list[int]:
+        receivers = {1: Receiver(1, **of_first), 2: Receiver(2), 3: Receiver(3)}  # type: ignore[arg-type]
+        return to(notices([Route(steps)], receivers, [alarm()], Record(), now, UTC, groups={7: self.SETTERS}))
+
+    def test_a_group_is_all_who_are_in_it(self) -> None:
+        assert self.named(NOON, Step(timedelta(0), (3,), groups=(7,))) == [1, 2, 3]
+
+    def test_one_who_is_on_duty_is_notified_alone(self) -> None:
+        duty = Step(timedelta(0), (), on_duty=(7,))
+        assert self.named(NOON, duty) == [1]
+        assert self.named(NOON + 2 * HOUR, duty) == [2], "an alarm that is still active goes to the next shift"
+
+    def test_where_nobody_is_on_duty_or_can_be_reached_the_next_step_begins_at_once(self) -> None:
+        steps = Step(timedelta(0), (), on_duty=(7,)), Step(HOUR * 24, (3,))
+        assert self.named(NOON, *steps) == [1]
+        assert self.named(NOON + 10 * HOUR, *steps) == [3], "22:00: nobody is on duty"
+        assert self.named(NOON, *steps, away_until=NOON + HOUR) == [3]
+
+    def test_a_turn_is_kept_from_its_first_day_to_its_last_as_it_begins(self) -> None:
+        night = Turn((1,), Hours(EVERY_DAY, time(22), time(6)), date(2026, 11, 26), date(2026, 11, 26))
+        days = [datetime(2026, 11, day, hour, tzinfo=UTC) for day, hour in ((26, 5), (26, 23), (27, 5), (27, 23))]
+        assert [night.holds(moment) for moment in days] == [False, True, True, False]

@@ -78,6 +78,8 @@ ADDED_TABLES = {
     "import_mapping",
     "receiver",
     "notification_route",
+    "receiver_group",
+    "plant_calendar",
     "announced",
     "delivery",
     "quarantine",

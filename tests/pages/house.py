@@ -188,6 +188,9 @@ PAGES = {
     "/kinematics/measuring-plan": ["/kinematics/measuring-plan"],
     "/setup/jobs": ["/setup/jobs"],
     "/setup/notifications": ["/setup/notifications"],
+    "/setup/notifications/days-off": ["/setup/notifications/days-off"],
+    "/setup/notifications/groups/new": ["/setup/notifications/groups/new"],
+    "/setup/notifications/groups/{group}": ["/setup/notifications/groups/{group}"],
     "/setup/notifications/routes/new": ["/setup/notifications/routes/new"],
     "/setup/notifications/routes/{route}": ["/setup/notifications/routes/{route}"],
     "/account/notifications": ["/account/notifications"],
@@ -408,6 +411,9 @@ def _notified(made: Shop) -> None:
         "quiet": [{"days": [6, 7], "begins": "22:00", "ends": "06:00"}],
     }
     number = made.call("POST", "/notifications/receivers", 201, **receiver)["id"]
+    turn = {"receivers": [number], "shift": "06:00", "days": [1, 2, 3, 4, 5]}
+    made.call("POST", "/notifications/groups", 201, name="Setters of the hall", members=[number], rota=[turn])
+    made.call("PUT", "/notifications/calendar", country="DE", subdivision="BY", days=["2026-12-24"])
     hours = [{"days": [1, 2, 3, 4, 5], "begins": "06:00", "ends": "14:00"}]
     steps = [{"receivers": [number]}, {"after": 15, "receivers": [number]}]
     route: dict[str, Any] = {"kinds": ["tool_worn", "probe_fault"], "hours": hours, "steps": steps, "enabled": False}
@@ -447,5 +453,6 @@ def values_of(shop: Shop) -> dict[str, Any]:
             "url"
         ].partition("#")[2],
         "route": shop.call("GET", "/notifications/routes")["items"][-1]["id"],
+        "group": shop.call("GET", "/notifications/groups")["items"][-1]["id"],
         "plan": shop.call("GET", "/reactions/plans")["items"][-1]["id"],
     }

@@ -75,6 +75,7 @@ KNOWN = (
     ("/setup/reactions/{plan}", "SELECT DISTINCT id AS plan FROM reaction_plan ORDER BY 1"),
     ("/catalogue/{entry}", _numbered("catalogue_entry", "entry")),
     ("/routes/{route}", _numbered("notification_route", "route")),
+    ("/groups/{group}", _numbered("receiver_group", "group")),
     ("/receivers/{receiver}", _numbered("receiver", "receiver")),
     *((part, FEATURES) for part in ("/forms/features/{machine}/{feature}", "{machine}/forms/{feature}")),
     ("/pictures/{picture}", _numbered("reaction_picture", "picture", "digest")),

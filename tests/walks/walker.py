@@ -32,6 +32,7 @@ WITHOUT_BODY = {
     "POST /api/v1/kinematics/runs/{run}/recompute",
     "DELETE /api/v1/notifications/routes/{route}",
     "DELETE /api/v1/notifications/receivers/{receiver}",
+    "DELETE /api/v1/notifications/groups/{group}",
     "POST /api/v1/notifications/receivers/{receiver}/test",
     "DELETE /api/v1/notifications/me",
     "DELETE /api/v1/machines/{machine}/keys/{key}",

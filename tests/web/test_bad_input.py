@@ -94,6 +94,12 @@ RECEIVER: dict[str, Any] = {
     "away_until": "2026-11-21T08:15:02Z",
     "events": ["tool"],
 }
+TURN: dict[str, Any] = {"receivers": [1], "days": [1, 2], "first": "2026-11-30", "last": "2026-12-31"}
+GROUP: dict[str, Any] = {
+    "name": "Setters",
+    "members": [1],
+    "rota": [TURN | {"shift": "06:00"}, TURN | {"begins": "22:00", "ends": "06:00"}],
+}
 REACTION: dict[str, Any] = {
     "name": "Seat oversize",
     "steps": [{"text": "Set the part aside."}],
@@ -105,6 +111,9 @@ REACTION: dict[str, Any] = {
 BODIES: dict[str, dict[str, Any]] = {
     "POST /api/v1/notifications/routes": ROUTE,
     "PUT /api/v1/notifications/routes/{route}": ROUTE,
+    "POST /api/v1/notifications/groups": GROUP,
+    "PUT /api/v1/notifications/groups/{group}": GROUP,
+    "PUT /api/v1/notifications/calendar": {"country": "DE", "subdivision": "BY", "days": ["2026-12-24"]},
     "POST /api/v1/notifications/receivers": RECEIVER | {"means": "webhook"},
     "PATCH /api/v1/notifications/receivers/{receiver}": RECEIVER | {"address": "anna@example.com", "events": []},
     "PUT /api/v1/notifications/me": {
@@ -589,6 +598,7 @@ class Place:
             "proposal": proposal["id"],
             "receiver": self.notified(shop),
             "route": 1,
+            "group": 1,
             "plan": shop.call("POST", "/reactions/plans", 201, **self.reaction(shop))["id"],
             "entry": shop.call("POST", "/reactions/catalogue", 201, sort="action", name=shop.machine)["id"],
             "picture": shop.admin.post("/api/v1/reactions/pictures", json=example_of("PictureIn")).json()["digest"],
@@ -659,6 +669,7 @@ class Place:
         number = shop.call("POST", "/notifications/receivers", 201, **sent)["id"]
         steps = [{"receivers": [number]}]
         shop.call("POST", "/notifications/routes", 201, name="Off", enabled=False, steps=steps)
+        shop.call("POST", "/notifications/groups", 201, name="Setters", members=[number])
         test = shop.call("POST", f"/notifications/receivers/{number}/test", 202)["id"]
         until(lambda: shop.call("GET", f"/notifications/deliveries/{test}")["state"] == "failed")
         return number

@@ -91,6 +91,18 @@ def _receiver(shop: Shop, n: int) -> Edit:
     return f"/notifications/receivers/{number}", {"address": f"anna-{n}@example.com"}
 
 
+def _group(shop: Shop, n: int) -> Edit:
+    name = f"group-{shop.machine}"
+    if n == 1:
+        anna: dict[str, Any] = {"name": name, "means": "mail", "address": "anna@example.com"}
+        members = [shop.call("POST", "/notifications/receivers", 201, **anna)["id"]]
+        shop.call("POST", "/notifications/groups", 201, name=name, members=members)
+    groups = shop.call("GET", "/notifications/groups?limit=1000")["items"]
+    group = next(each for each in groups if each["name"] == name)
+    turn = {"receivers": group["members"], "days": [n]}
+    return f"/notifications/groups/{group['id']}", {"name": name, "members": group["members"], "rota": [turn]}
+
+
 def _entry(shop: Shop, n: int) -> Edit:
     name = f"Chip at {shop.machine}"
     if n == 1:
@@ -129,6 +141,8 @@ EDITS: dict[str, Callable[[Shop, int], Edit]] = {
     "PUT /gauge-studies/{study}": _study,
     "PATCH /people/{person}": _person,
     "PUT /notifications/routes/{route}": _route,
+    "PUT /notifications/groups/{group}": _group,
+    "PUT /notifications/calendar": lambda _shop, n: ("/notifications/calendar", {"days": [f"2031-01-0{n}"]}),
     "PUT /characteristics/{characteristic}/control-plan": lambda shop, n: (
         f"/characteristics/{shop.characteristic}/control-plan",
         {"every": 4 + n} | WHY,

@@ -68,7 +68,7 @@ def _rule(given: RouteIn) -> dict[str, Any]:
 
 
 def _check_route(session: Session, given: RouteIn) -> None:
-    """Refuse names that nothing has: such a route would wait for ever. Raises `Invalid`, and `NotFound` for a receiver."""
+    """Refuse names that nothing has: such a route would wait for ever. Raises `Invalid`, and `NotFound` for a receiver or a group."""
     errors = _unknown("kinds", given.kinds, {kind.name for kind in kinds()}, _("there is no kind of alarm {name}"))
     for field, named, key, words in (
         ("machines", given.machines, Machine.key, _("there is no machine {name}")),
@@ -78,9 +78,9 @@ def _check_route(session: Session, given: RouteIn) -> None:
         errors += _unknown(field, named, known, words)
     if errors:
         raise Invalid(f"{errors[0].field}: {errors[0].message}.", errors=errors)
-    there = {row.id for row in queries.receivers(session)}
-    for number in sorted(queries.receivers_of(_rule(given)) - there):
-        raise NotFound(_("There is no receiver {number}.").format(number=number), _("Choose one of the list."))
+    queries.check_receivers(session, queries.receivers_of(_rule(given)))
+    for number in sorted(queries.groups_of(_rule(given))):
+        queries.group(session, number, hold=True)
 
 
 def _unknown(field: str, named: Iterable[str], known: Container[Any], words: str) -> list[FieldError]:
@@ -154,13 +154,18 @@ def change_receiver(
 
 
 def delete_receiver(session: Session, number: int, caller: Caller) -> None:
-    """Delete a receiver. Raises `NotFound`; `Conflict` while a route or a reaction plan names it."""
+    """Delete a receiver. Raises `NotFound`; `Conflict` while a route, a group or a reaction plan names it."""
     row = queries.receiver(session, number, hold=True)
     used = queries.routes_to(session, number)
     if used:
         raise Conflict(
             _("The route “{name}” names this receiver.").format(name=used[0].name),
             _("Take it out of the route first, or delete the route."),
+        )
+    group = next(iter(queries.groups_with(session, number)), None)
+    if group is not None:
+        raise Conflict(
+            _("This receiver is in the group “{name}”.").format(name=group.name), _("Take it out of the group first.")
         )
     named = next((plan for plan in plans_in_force(session) if number in plan.receivers), None)
     if named is not None:

@@ -1,5 +1,6 @@
 """JSON routes: notifications. For administrators; everybody says where they get mail themselves."""
 
+from datetime import UTC, datetime
 from typing import Annotated
 
 from fastapi import Path, Query, Response
@@ -7,7 +8,10 @@ from fastapi import Path, Query, Response
 from app.access.deps import Admin, Viewer, require
 from app.errors import NotFound
 from app.language.i18n import _
-from app.loop.notifications import actions, queries
+from app.language.times import local
+from app.loop.notifications import actions, calendar_actions, calendar_queries, group_actions, queries
+from app.loop.notifications.calendar_schemas import CalendarIn, CalendarOut, ComingOut
+from app.loop.notifications.group_schemas import DutyOut, GroupIn, GroupOut
 from app.loop.notifications.schemas import (
     DeliveryOut,
     NewReceiverOut,
@@ -26,6 +30,7 @@ from app.web.fields import LARGEST_ID, Page, page_of
 router = api_router("notifications")
 RouteId = Annotated[int, Path(ge=1, le=LARGEST_ID, description="Number of the route.", examples=[1])]
 ReceiverId = Annotated[int, Path(ge=1, le=LARGEST_ID, description="Number of the receiver.", examples=[1])]
+GroupId = Annotated[int, Path(ge=1, le=LARGEST_ID, description="Number of the group.", examples=[1])]
 DeliveryId = Annotated[int, Path(ge=1, le=LARGEST_ID, description="Number of the delivery.", examples=[1])]
 ADMIN = [require("admin")]
 
@@ -101,7 +106,7 @@ def change_receiver(
 
 @router.delete("/notifications/receivers/{receiver}", status_code=204, responses=problems(404, 409))
 def delete_receiver(session: SessionDep, caller: Admin, receiver: ReceiverId) -> Response:
-    """Delete a receiver; 409 while a route or a reaction plan names it. Its deliveries stay on record."""
+    """Delete a receiver; 409 while a route, a group or a reaction plan names it. Its deliveries stay on record."""
     actions.delete_receiver(session, receiver, caller)
     return Response(status_code=204)
 
@@ -110,6 +115,69 @@ def delete_receiver(session: SessionDep, caller: Admin, receiver: ReceiverId) ->
 def send_test(session: SessionDep, caller: Admin, receiver: ReceiverId) -> DeliveryOut:
     """Send a test within seconds, whether the receiver is quiet, away or failing; the delivery says how it ended."""
     return DeliveryOut.of(actions.ask_for_test(session, receiver, caller))
+
+
+@router.get("/notifications/groups", dependencies=ADMIN)
+def list_receiver_groups(session: SessionDep, after: After = 0, limit: Limit = 100) -> Page[GroupOut]:
+    """Groups of receivers, and their rotas."""
+    rows = [GroupOut.of(row) for row in queries.groups(session, after, limit + 1)]
+    return page_of(rows, limit, lambda row: row.id)
+
+
+@router.post("/notifications/groups", status_code=201, responses=problems(404, 409))
+def add_receiver_group(session: SessionDep, caller: Admin, group: GroupIn, response: Response) -> GroupOut:
+    """Add a group. Nobody is notified before a route names it."""
+    row = group_actions.add_group(session, group, caller)
+    response.headers["Location"] = f"/api/v1/notifications/groups/{row.id}"
+    return GroupOut.of(row)
+
+
+@router.get("/notifications/groups/{group}", dependencies=ADMIN, responses=problems(404) | TAGGED)
+@tagged
+def get_receiver_group(session: SessionDep, group: GroupId) -> GroupOut:
+    """One group, and its rota."""
+    return GroupOut.of(queries.group(session, group))
+
+
+@router.get("/notifications/groups/{group}/on-duty", dependencies=ADMIN, responses=problems(404))
+def get_who_is_on_duty(session: SessionDep, group: GroupId) -> DutyOut:
+    """The receivers of the group that are on duty now, by the plant's clock."""
+    return DutyOut.of(queries.group(session, group), datetime.now(UTC))
+
+
+@router.put("/notifications/groups/{group}", responses=problems(404, 412))
+@guarded(get_receiver_group, queries.hold_group)
+def change_receiver_group(session: SessionDep, caller: Admin, group: GroupId, given: GroupIn) -> GroupOut:
+    """Replace a group and its rota."""
+    return GroupOut.of(group_actions.change_group(session, group, given, caller))
+
+
+@router.delete("/notifications/groups/{group}", status_code=204, responses=problems(404, 409))
+def delete_receiver_group(session: SessionDep, caller: Admin, group: GroupId) -> Response:
+    """Delete a group; 409 while a route names it."""
+    group_actions.delete_group(session, group, caller)
+    return Response(status_code=204)
+
+
+@router.get("/notifications/calendar", dependencies=ADMIN, responses=TAGGED)
+@tagged
+def get_days_off(session: SessionDep) -> CalendarOut:
+    """Days on which the plant does not work: public holidays and its own."""
+    return calendar_queries.as_answer(session)
+
+
+@router.put("/notifications/calendar", responses=problems(412))
+@guarded(get_days_off, calendar_queries.hold_calendar)
+def set_days_off(session: SessionDep, caller: Admin, given: CalendarIn) -> CalendarOut:
+    """Say on which days the plant does not work. Routes that are not open on days off are closed on them."""
+    calendar_actions.set_calendar(session, given, caller)
+    return calendar_queries.as_answer(session)
+
+
+@router.get("/notifications/calendar/coming", dependencies=ADMIN)
+def list_coming_days_off(session: SessionDep, settings: SettingsDep) -> ComingOut:
+    """Days off of the next year, public holidays with their names."""
+    return calendar_queries.coming(session, local(datetime.now(UTC)).date(), settings)
 
 
 @router.get("/notifications/deliveries", dependencies=ADMIN)

@@ -10,7 +10,6 @@ from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
 from contextvars import copy_context
-from datetime import date
 from functools import partial
 from typing import TypeVar
 
@@ -19,6 +18,7 @@ from sqlalchemy.exc import OperationalError
 from app.db.engine import Database
 from app.db.outage import Outage
 from app.loop.notifications import sending
+from app.loop.notifications.calendar_queries import of_settings
 from app.loop.notifications.means import Answer, Job, deliver
 from app.settings import Settings
 
@@ -39,7 +39,7 @@ class Notifier:
         self._database = database
         self._shift_report = shift_report
         self._settings = settings
-        self._days_off = frozenset(date.fromisoformat(day) for day in settings.days_off.split(",") if day)
+        self._days_off = of_settings(settings)
         self._threads = ThreadPoolExecutor(2, thread_name_prefix="notifications")  # never those of the readings door
         self._closing = asyncio.Event()
         self._task: asyncio.Task[None] | None = None

@@ -1,6 +1,6 @@
 """Queries of routes, receivers and deliveries. Never writes."""
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from typing import Any, NamedTuple
 
 from sqlalchemy import or_, select
@@ -9,7 +9,7 @@ from sqlalchemy.orm import Session
 from app.access.queries import hold_person
 from app.errors import NotFound
 from app.language.i18n import _
-from app.loop.notifications.tables import Delivery, NotificationRoute, Receiver
+from app.loop.notifications.tables import Delivery, NotificationRoute, Receiver, ReceiverGroup
 
 
 def routes(session: Session, after: int = 0, limit: int = 1000) -> Sequence[NotificationRoute]:
@@ -71,6 +71,47 @@ def routes_to(session: Session, number: int) -> list[NotificationRoute]:
 def receivers_of(rule: Mapping[str, Any]) -> set[int]:
     """The numbers of all receivers that a stored rule names."""
     return {number for step in rule["steps"] for number in step["receivers"]}
+
+
+def check_receivers(session: Session, numbers: Iterable[int]) -> None:
+    """Refuse numbers that no receiver has. Raises `NotFound`."""
+    there = {row.id for row in receivers(session)}
+    for number in sorted(set(numbers) - there):
+        raise NotFound(_("There is no receiver {number}.").format(number=number), _("Choose one of the list."))
+
+
+def groups(session: Session, after: int = 0, limit: int = 1000) -> Sequence[ReceiverGroup]:
+    """Groups of receivers, in the order in which they were added."""
+    query = select(ReceiverGroup).where(ReceiverGroup.id > after).order_by(ReceiverGroup.id).limit(limit)
+    return session.scalars(query).all()
+
+
+def group(session: Session, number: int, *, hold: bool = False) -> ReceiverGroup:
+    """One group. hold: until the transaction ends. Raises `NotFound`."""
+    found = session.get(ReceiverGroup, number, with_for_update=hold or None, populate_existing=True)
+    if found is None:
+        raise NotFound(_("There is no group {number}.").format(number=number), _("Choose one of the list."))
+    return found
+
+
+def hold_group(session: Session, given: Mapping[str, Any]) -> None:
+    """Hold the group that is named until the transaction ends."""
+    group(session, given["group"], hold=True)
+
+
+def groups_of(rule: Mapping[str, Any]) -> set[int]:
+    """The numbers of all groups that a stored rule names."""
+    return {number for step in rule["steps"] for number in (*step.get("groups", ()), *step.get("on_duty", ()))}
+
+
+def routes_to_group(session: Session, number: int) -> list[NotificationRoute]:
+    """The routes that name a group."""
+    return [row for row in routes(session) if number in groups_of(row.rule)]
+
+
+def groups_with(session: Session, number: int) -> list[ReceiverGroup]:
+    """The groups that a receiver is in."""
+    return [row for row in groups(session) if number in row.members]
 
 
 def names(session: Session, numbers: Collection[int]) -> dict[int, str]:

@@ -44,14 +44,29 @@ class HoursIn(Body):
 Week = Annotated[list[HoursIn], Field(max_length=20)]
 
 
+Numbers = Annotated[list[Annotated[int, Field(strict=True, ge=1, le=LARGEST_ID)]], Field(max_length=50)]
+
+
 class StepIn(Body):
-    """Receivers, and after how many minutes they are notified of an alarm that is still active."""
+    """Receivers and groups, and after how many minutes they are notified of an alarm that is still active."""
 
     after: Annotated[Minutes, Field(description="Minutes after the alarm.")] = 0
-    receivers: Annotated[
-        list[Annotated[int, Field(strict=True, ge=1, le=LARGEST_ID)]],
-        Field(min_length=1, max_length=50, description="Numbers of receivers."),
-    ]
+    receivers: Annotated[Numbers, Field(description="Numbers of receivers.")] = Field(default_factory=list)
+    groups: Annotated[Numbers, Field(description="Numbers of groups: all of each.")] = Field(default_factory=list)
+    on_duty: Annotated[
+        Numbers,
+        Field(description="Numbers of groups: who is on duty in each; where nobody is, the next step begins at once."),
+    ] = Field(default_factory=list)
+
+    @model_validator(mode="after")
+    def _somebody(self) -> Self:
+        if not (self.receivers or self.groups or self.on_duty):
+            raise PydanticCustomError("nobody", _("must name at least one receiver or group"), {"at": "receivers"})
+        return self
+
+    def value(self) -> Step:
+        """As the core reads it."""
+        return Step(timedelta(minutes=self.after), tuple(self.receivers), tuple(self.groups), tuple(self.on_duty))
 
 
 class Rule(Body):
@@ -91,7 +106,7 @@ class Rule(Body):
     def value(self) -> Route:
         """As the core reads it."""
         return Route(
-            tuple(Step(timedelta(minutes=step.after), tuple(step.receivers)) for step in self.steps),
+            tuple(step.value() for step in self.steps),
             kinds=frozenset(self.kinds),
             tones=frozenset(self.tones),
             machines=frozenset(self.machines),

@@ -24,7 +24,9 @@ from app.language.times import end_of_shift, plant_zone
 from app.loop.alarm_response.queries import AlarmRow, alarm
 from app.loop.alarm_response.reaction_queries import Reactions, plans_in_force, trouble_of
 from app.loop.alarms.kinds import kind_named
-from app.loop.notifications import message
+from app.loop.notifications import message, queries
+from app.loop.notifications.calendar_queries import days_off as days_off_of
+from app.loop.notifications.group_schemas import group_of
 from app.loop.notifications.means import Answer, Job, Message
 from app.loop.notifications.picture import of_last_readings
 from app.loop.notifications.schemas import HoursIn, Rule, week
@@ -53,7 +55,7 @@ _PLANNING = text("SELECT pg_try_advisory_xact_lock(7291, 'delivery'::regclass::o
 def plan(session: Session, address: str, days_off: frozenset[date]) -> list[Job]:
     """Begin every delivery that is due: tests, messages about alarms, changes for webhooks.
 
-    address: of this server, for links. Another process that plans at this moment leaves nothing to do.
+    address: of this server, for links. days_off: beside those of the plant's calendar. Another process that plans at this moment leaves nothing to do.
     """
     wanted = select(Receiver).where(
         Receiver.deleted_at.is_(None),
@@ -187,7 +189,10 @@ def _about_alarms(
     routes = [Rule.model_validate(rule).value() for rule in stored]
     if planned:
         routes += _of_plans(session)
-    found = notices(routes, receivers, active, _record(session, active, same, now), now, plant_zone(), days_off)
+    groups = {row.id: group_of(row) for row in queries.groups(session)}
+    today = now.astimezone(plant_zone()).date()
+    off = days_off_of(session, {today.year, (today - notify.DAY).year}, days_off)
+    found = notices(routes, receivers, active, _record(session, active, same, now), now, plant_zone(), off, groups)
     found = list({min(same[notice.receiver]): notice for notice in reversed(found)}.values())  # one to each address
     found.sort(
         key=lambda notice: rows[notice.receiver].failures

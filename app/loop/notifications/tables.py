@@ -1,4 +1,4 @@
-"""Receivers of notifications, routes to them, what was announced to whom, and each delivery.
+"""Receivers of notifications, groups of them, routes to them, days off, what was announced to whom, and each delivery.
 
 An active alarm and `Announced` say together what is still to be sent, so nothing is announced before it is committed, and a
 server that ends in between sends it later. Changes for webhooks stand in the journal of events, in the order of the commits.
@@ -14,6 +14,7 @@ from app.db.base import Base
 
 RECEIVER_NUMBERS = Sequence("receiver_id", metadata=Base.metadata)
 ROUTE_NUMBERS = Sequence("notification_route_id", metadata=Base.metadata)
+GROUP_NUMBERS = Sequence("receiver_group_id", metadata=Base.metadata)
 DELIVERY_NUMBERS = Sequence("delivery_id", metadata=Base.metadata)
 
 
@@ -66,6 +67,33 @@ class NotificationRoute(Base):
     rule: Mapped[dict[str, Any]]
     created_at: Mapped[datetime] = mapped_column(server_default=func.now())
     created_by: Mapped[str]
+
+
+class ReceiverGroup(Base):
+    """Receivers that routes name together: `members` are their numbers, `rota` a list of `group_schemas.TurnIn`."""
+
+    __tablename__ = "receiver_group"
+
+    id: Mapped[int] = mapped_column(BigInteger, primary_key=True, server_default=text("nextval('receiver_group_id')"))
+    name: Mapped[str]
+    members: Mapped[list[Any]]
+    rota: Mapped[list[Any]]
+    created_at: Mapped[datetime] = mapped_column(server_default=func.now())
+    created_by: Mapped[str]
+
+
+class PlantCalendar(Base):
+    """The days off of the plant, in one row: public holidays of a country or a part of it, and days of its own."""
+
+    __tablename__ = "plant_calendar"
+    __table_args__ = (CheckConstraint("id = 1", name="one"),)
+
+    id: Mapped[int] = mapped_column(primary_key=True, autoincrement=False)
+    country: Mapped[str | None]
+    subdivision: Mapped[str | None]
+    days: Mapped[list[Any]]
+    changed_at: Mapped[datetime] = mapped_column(server_default=func.now())
+    changed_by: Mapped[str]
 
 
 class Announced(Base):

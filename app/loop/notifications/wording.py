@@ -1,9 +1,12 @@
 """Notifications in words."""
 
 from collections.abc import Mapping
+from datetime import datetime
 from typing import Any
 
 from app.language.i18n import _
+from app.loop.notifications.group_schemas import DutyOut
+from app.loop.notifications.tables import ReceiverGroup
 
 
 def means_word(means: str) -> str:
@@ -51,3 +54,31 @@ def when(hours: Mapping[str, Any]) -> str:
     if len(days) > 2 and days == list(range(days[0], days[-1] + 1)):
         text = f"{names[days[0] - 1]}–{names[days[-1] - 1]}"
     return f"{text} {hours['begins']}–{hours['ends']}"
+
+
+def on_duty_word(group: str) -> str:
+    """Those on duty in a group, as a route names them."""
+    return _("on duty: {group}").format(group=group)
+
+
+def _rota(row: ReceiverGroup, names: Mapping[int, str]) -> list[str]:
+    """The rota of a group, a sentence for each turn."""
+    words = []
+    for turn in row.rota:
+        whom = ", ".join(names.get(number, str(number)) for number in turn["receivers"])
+        hours = {"days": turn["days"], "begins": turn["shift"] or turn["begins"] or "00:00"}
+        hours["ends"] = turn["ends"] or (_("end of shift") if turn["shift"] else "24:00")
+        parts = [when(hours)]
+        if turn["first"]:
+            parts.append(_("from {day}").format(day=turn["first"]))
+        if turn["last"]:
+            parts.append(_("until {day}").format(day=turn["last"]))
+        words.append(f"{whom}: {' '.join(parts)}")
+    return words
+
+
+def group_words(row: ReceiverGroup, names: Mapping[int, str], now: datetime) -> tuple[str, list[str], str]:
+    """The members of a group, its rota, and those on duty at this moment."""
+    members = ", ".join(names.get(number, str(number)) for number in row.members)
+    duty = ", ".join(names.get(number, str(number)) for number in DutyOut.of(row, now).receivers)
+    return members, _rota(row, names), duty

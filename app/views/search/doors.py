@@ -67,7 +67,12 @@ def doors() -> list[Door]:
         Door(_("Record of changes"), "/setup/audit", _("audit trail, who changed what"), "engineer"),
         Door(_("Wall screens"), "/setup/screens", _("big screen in the hall, andon, dashboard, kiosk"), "admin"),
         Door(_("Reaction plans"), "/setup/reactions", _("steps, causes, corrective actions, catalogue"), "engineer"),
-        Door(_("Notifications"), "/setup/notifications", _("mail, webhook, escalation, quiet hours, on call"), "admin"),
+        Door(
+            _("Notifications"),
+            "/setup/notifications",
+            _("mail, webhook, escalation, quiet hours, on call, groups, rota, days off, holidays"),
+            "admin",
+        ),
         Door(_("Background jobs"), "/setup/jobs", _("periodic jobs, failing"), "engineer"),
         Door(_("Proof"), "/proof", _("published examples, validation")),
         Door(_("Licences"), "/licences", _("libraries, versions, SBOM, open source")),

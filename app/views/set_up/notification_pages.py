@@ -1,6 +1,7 @@
 """Pages of notifications: receivers, routes and deliveries for administrators; one's own mail address."""
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
+from datetime import UTC, datetime
 from functools import partial
 from typing import Any
 
@@ -11,12 +12,22 @@ from starlette.responses import RedirectResponse
 from app.access.deps import Admin, Caller, Viewer
 from app.errors import Conflict, InbandError, Invalid
 from app.language.i18n import _
+from app.language.times import local
 from app.loop.alarms.kinds import kinds
 from app.loop.notifications import actions, queries
+from app.loop.notifications.calendar_queries import coming
 from app.loop.notifications.schemas import OwnAddressIn, ReceiverIn, RouteIn, shown_address
-from app.loop.notifications.wording import changes_word, delivery_word, means_word, tones, when
+from app.loop.notifications.wording import (
+    changes_word,
+    delivery_word,
+    group_words,
+    means_word,
+    on_duty_word,
+    tones,
+    when,
+)
 from app.views.set_up.frame import setup_page
-from app.web.deps import Before, FormDep, SessionDep, SettingsDep
+from app.web.deps import Before, FormDep, SessionDep, SettingsDep, get_settings
 from app.web.forms import by_field, parsed, whole
 from app.web.paging import address, part_of
 from app.web.states import word_of
@@ -26,6 +37,8 @@ router = APIRouter(include_in_schema=False)
 ON_PAGE = 50
 MOST_STEPS = 3
 EVERY_DAY = range(1, 8)
+STEP_PARTS = {"step": "receivers", "group": "groups", "duty": "on_duty"}
+"""Ticks of a step in the form, and what they are in its schema."""
 
 
 @router.get("/setup/notifications")
@@ -44,7 +57,7 @@ def send_receiver(
         given = parsed(
             ReceiverIn,
             {name: form.get(name, "").strip() for name in ("name", "means", "address")}
-            | {"quiet": _hours(form, "quiet", EVERY_DAY), "events": _ticked(form, "events")},
+            | {"quiet": _hours(form, "quiet", EVERY_DAY), "events": ticked(form, "events")},
         )
         row = actions.add_receiver(session, given, caller, settings)
     except InbandError as error:
@@ -86,7 +99,8 @@ def _overview(
     rows = queries.deliveries(session, before=before, limit=ON_PAGE + 1, taken_changes=everything)
     here = partial(address, "/setup/notifications", show="all" if everything else None)
     receivers = queries.receivers(session)
-    names = {row.id: row.name for row in receivers}
+    names, groups = {row.id: row.name for row in receivers}, queries.groups(session)
+    of_groups, now = {row.id: row.name for row in groups}, datetime.now(UTC)
     return setup_page(
         request,
         "notifications.html",
@@ -94,7 +108,9 @@ def _overview(
         "notifications",
         status=error.status if error else 200,
         receivers=receivers,
-        routes=[(row, _summary(row.rule, names)) for row in queries.routes(session)],
+        routes=[(row, _summary(row.rule, names, of_groups)) for row in queries.routes(session)],
+        groups=[(row, *group_words(row, names, now)) for row in groups],
+        coming=coming(session, local(now).date(), get_settings(request)).days,
         part=part_of(rows, ON_PAGE, before, lambda row: row.delivery.id, here),
         everything=everything,
         typed=typed or {},
@@ -109,13 +125,16 @@ def _overview(
     )
 
 
-def _summary(rule: Mapping[str, Any], names: Mapping[int, str]) -> dict[str, str]:
+def _summary(rule: Mapping[str, Any], names: Mapping[int, str], groups: Mapping[int, str]) -> dict[str, str]:
     """A route in words: its alarms, its hours, its receivers."""
     alarms = [*map(word_of, rule["kinds"]), *map(dict(tones()).__getitem__, rule["tones"])]
     places = [*rule["machines"], *rule["characteristics"]]
     steps = []
     for step in rule["steps"]:
-        whom = ", ".join(names.get(number, str(number)) for number in step["receivers"])
+        parts = [names.get(number, str(number)) for number in step["receivers"]]
+        parts += [groups.get(number, str(number)) for number in step.get("groups", ())]
+        parts += [on_duty_word(groups.get(number, str(number))) for number in step.get("on_duty", ())]
+        whom = ", ".join(parts)
         steps.append(_("after {n} min {names}").format(n=step["after"], names=whom) if step["after"] else whom)
     return {
         "alarms": ", ".join(alarms) or _("all"),
@@ -194,6 +213,8 @@ def _route(
         kinds=sorted(((kind.name, kind.word()) for kind in kinds()), key=lambda kind: kind[1]),
         tones=tones(),
         receivers=queries.receivers(session),
+        groups=queries.groups(session),
+        on_duty_word=on_duty_word,
         steps=range(1, MOST_STEPS + 1),
     )
 
@@ -203,17 +224,18 @@ def _read(form: Mapping[str, str]) -> dict[str, Any]:
     flags = {name: form.get(name) == "true" for name in ("enabled", "on_days_off", "urgent")}
     minutes = {name: whole(form.get(name)) or 0 for name in ("repeat", "digest", "hold_off")}
     steps = [
-        {"after": whole(form.get(f"after-{at}")) or 0, "receivers": [int(each) for each in chosen if each.isdecimal()]}
+        {"after": whole(form.get(f"after-{at}")) or 0}
+        | {name: numbers(each) for name, each in zip(STEP_PARTS.values(), chosen, strict=True)}
         for at in range(1, MOST_STEPS + 1)
-        if (chosen := _ticked(form, f"step-{at}"))
+        if any(chosen := [ticked(form, f"{part}-{at}") for part in STEP_PARTS])
     ]
     return {
         "name": form.get("name"),
-        "kinds": _ticked(form, "kind"),
-        "tones": _ticked(form, "tone"),
+        "kinds": ticked(form, "kind"),
+        "tones": ticked(form, "tone"),
         "machines": form.get("machines", "").replace(",", " ").split(),
         "characteristics": form.get("characteristics", "").replace(",", " ").split(),
-        "hours": _hours(form, "hours", [int(day) for day in _ticked(form, "day") if day.isdecimal()] or EVERY_DAY),
+        "hours": _hours(form, "hours", [int(day) for day in ticked(form, "day") if day.isdecimal()] or EVERY_DAY),
         "steps": steps,
         **flags,
         **minutes,
@@ -234,14 +256,21 @@ def _fields(rule: Mapping[str, Any]) -> dict[str, str]:
         fields |= {"hours-begins": hours["begins"], "hours-ends": hours["ends"]}
         fields |= {f"day-{day}": "true" for day in hours["days"]}
     for at, step in enumerate(rule["steps"][:MOST_STEPS], 1):
-        fields |= {f"after-{at}": str(step["after"])} | {f"step-{at}-{each}": "true" for each in step["receivers"]}
+        fields |= {f"after-{at}": str(step["after"])} | {
+            f"{part}-{at}-{each}": "true" for part, name in STEP_PARTS.items() for each in step.get(name, ())
+        }
     names = {name: ", ".join(rule[name]) for name in ("machines", "characteristics")}
     return fields | names
 
 
-def _ticked(form: Mapping[str, str], name: str) -> list[str]:
+def ticked(form: Mapping[str, str], name: str) -> list[str]:
     """The choices of a group of ticks, `name-choice`."""
     return [field.removeprefix(f"{name}-") for field, value in form.items() if field.startswith(f"{name}-") and value]
+
+
+def numbers(ticked: Iterable[str]) -> list[int]:
+    """Numbers that were ticked."""
+    return [int(each) for each in ticked if each.isdecimal()]
 
 
 def _hours(form: Mapping[str, str], name: str, days: Any) -> list[dict[str, Any]]:

@@ -7,6 +7,7 @@ from app.access.deps import require
 from app.views.set_up import (
     audit_pages,
     characteristic_pages,
+    group_pages,
     job_pages,
     machine_pages,
     many_pages,
@@ -36,6 +37,7 @@ for part in (
     station_pages,
     screen_pages,
     notification_pages,
+    group_pages,
     audit_pages,
     job_pages,
 ):

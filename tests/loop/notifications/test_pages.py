@@ -110,7 +110,7 @@ def test_a_route_is_made_changed_and_deleted(shop: Shop, admin: Person) -> None:
 
 def test_a_route_that_the_form_cannot_hold_is_not_shortened_by_it(shop: Shop, admin: Person) -> None:
     anna = added(shop, admin)
-    steps = [{"after": minutes, "receivers": [anna["id"]]} for minutes in range(5)]
+    steps = [{"after": minutes, "receivers": [anna["id"]], "groups": [], "on_duty": []} for minutes in range(5)]
     body: dict[str, Any] = {"name": unique("Long"), "machines": [shop.machine], "steps": steps}
     made = shop.call("POST", "/notifications/routes", 201, **body)
     path = f"/setup/notifications/routes/{made['id']}"
