@@ -222,7 +222,7 @@ class Line:
             measured=None if probe.touches else probe.size,
             touches=probe.touches or None,
             measured_at=min(moment, datetime.now(UTC)) if past else moment,  # it may take longer than rehearsed
-            machined_at=None if past else self.pace.moment(probe.part.cut_at),
+            machined_at=None if past or probe.part.cut_at < self.pace.origin else self.pace.moment(probe.part.cut_at),
             part=f"{self._run}-{probe.part.serial:04d}",
             key=f"{self._run}:{self.key}:{probe.part.serial}:{probe.feature.key}",
             correction_in_effect=probe.part.in_effect[probe.feature.key],
