@@ -6,7 +6,7 @@ import threading
 from http.server import BaseHTTPRequestHandler, HTTPServer
 from typing import Any
 
-from inband_client import Client
+from inband_client import Client, Invalid
 
 log = logging.getLogger(__name__)
 
@@ -33,10 +33,18 @@ class _Andon(BaseHTTPRequestHandler):
 
 
 def start(admin: Client) -> None:
-    """Listen, and let Inband notify it of what stops a machine or wears a tool."""
+    """Listen, and let Inband notify it of what stops a machine or wears a tool, where its administrator permits that."""
     server = HTTPServer(("127.0.0.1", 0), _Andon)
+    try:
+        _add(admin, f"http://127.0.0.1:{server.server_port}/")
+    except Invalid as refusal:
+        server.server_close()
+        log.warning("no andon: %s", refusal)
+        return
     threading.Thread(target=server.serve_forever, name="demo andon", daemon=True).start()
-    address = f"http://127.0.0.1:{server.server_port}/"
+
+
+def _add(admin: Client, address: str) -> None:
     known = next((each for each in admin.items("/notifications/receivers") if each["name"] == NAME), None)
     if known is not None:  # of an earlier run, which had another port
         admin.call("PATCH", f"/notifications/receivers/{known['id']}", json={"address": address})
