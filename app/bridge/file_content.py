@@ -145,6 +145,8 @@ def _nothing_found(settings: Settings) -> str:
     return "The file holds no readings."
 
 
+STEPS_BACK: Final = 2
+"""In time, from line to line: a file has its newest line first."""
 _TIMES: Final = ("measured_at", "machined_at")
 
 
@@ -159,14 +161,17 @@ def _moment(body: Mapping[str, Any], names: tuple[str, ...] = _TIMES) -> datetim
 
 
 def _oldest_first(entries: list[Entry]) -> list[Entry]:
-    """The readings in their order, but by their times where the newest of each characteristic stands first."""
+    """The readings in their order, but by their times where the newest of each characteristic stands first.
+
+    One step back alone says nothing: it is a late reading.
+    """
     times: dict[str, list[datetime]] = {}
     for entry in entries:
         if (at := _moment(entry.body)) is None:
             return entries
         times.setdefault(entry.body["characteristic"], []).append(at)
     pairs = [pair for each in times.values() for pair in pairwise(each)]
-    if any(one < two for one, two in pairs) or not any(one > two for one, two in pairs):
+    if any(one < two for one, two in pairs) or sum(one > two for one, two in pairs) < STEPS_BACK:
         return entries
     upwards = entries[::-1]  # like times stay in this order
     return sorted(upwards, key=lambda entry: cast("datetime", _moment(entry.body)))

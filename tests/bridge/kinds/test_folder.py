@@ -391,14 +391,15 @@ def test_readings_that_stand_newest_first_come_in_the_order_of_time(tmp_path: Pa
     assert parts(C, twin, B, A) == ["P5", "P6", "twin", "P7"]
     assert parts(A, C, B) == ["P5", "P7", "P6"]  # as the program wrote them
     assert parts(B, twin) == ["P6", "twin"]
+    assert parts(B, A) == ["P6", "P5"]  # one step back is a late reading
 
 
 def test_a_window_that_rolls_stores_each_part_once_though_the_bridge_starts_again(tmp_path: Path) -> None:
     async def work() -> None:
         lines = [f"23.11.2026 06:{at // 2:02}:00;D40;40,0{at // 2 % 10}\n" for at in range(24)]  # pairs of equal ones
         store = store_in(tmp_path / "store")
-        for newest in range(4, 25, 2):
-            window = lines[newest - 4 : newest]
+        for newest in range(6, 25, 2):
+            window = lines[newest - 6 : newest]
             link = Folder(machine(tmp_path, columns=NO_PART))
             await link.connect()
             write(tmp_path / "a.csv", "time;feature;actual\n" + "".join(reversed(window)))
