@@ -1,9 +1,9 @@
 """The readings in a file of a measuring machine: CSV, XLSX, NDJSON, a text protocol, or AQDEF. Nothing is moved or sent here.
 
 A file is taken whole or not at all: one line that cannot be read is a `Fault`, and a person puts the file right. Each reading has
-a key for ever. With a time of its own a reading is known by that, by characteristic, size and part, and like ones by their
-place among each other: the same file again, one that has grown, one with the newest line first, and a window that rolls bring
-nothing twice. Without a time it is a hash of the file up to its line and of its own fields, and without part and key too the
+a key for ever. With a time to the second a reading is known by that, by characteristic, size and part, and like ones by
+their place among each other: the same file again, one that has grown, one with the newest line first, and a window that rolls
+bring nothing twice. Else it is a hash of the file up to its line and of its own fields, and without time, part and key the
 file's name and its time of modification tell it apart.
 """
 
@@ -14,14 +14,13 @@ from collections import Counter
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, field
-from datetime import UTC, datetime
-from itertools import pairwise
 from math import isfinite
 from pathlib import Path
-from typing import Any, Final, NamedTuple, cast
+from typing import Any, Final
 
 from app.bridge.configuration import Machine
 from app.bridge.fields import EVERY, FIELDS, TEMPERATURES, Form, put
+from app.bridge.file_entries import TIMES, Entry, meant, oldest_first, to_the_second
 from app.bridge.file_rows import (
     Fault,
     Found,
@@ -55,15 +54,6 @@ from app.files.formats.units import LENGTHS, UnknownUnit, beside, in_celsius, le
 
 NAMES: Final = {"csv": "*.csv", "xlsx": "*.xls[xm]", "ndjson": "*.ndjson", "text": "*.txt", "aqdef": "*.df[qdxQDX]"}
 NOT_ALONE: Final = 2  # files of a pair
-
-
-class Entry(NamedTuple):
-    """One reading: its line, the characteristic as the file names it, and what `POST /readings` takes, without the key."""
-
-    line: int
-    name: str
-    body: dict[str, Any]
-    key: str
 
 
 @dataclass(slots=True)
@@ -145,38 +135,6 @@ def _nothing_found(settings: Settings) -> str:
     return "The file holds no readings."
 
 
-STEPS_BACK: Final = 2
-"""In time, from line to line: a file has its newest line first."""
-_TIMES: Final = ("measured_at", "machined_at")
-
-
-def _meant(body: Mapping[str, Any]) -> str:
-    """The meaning of a reading that has a time: where it stands, a remark beside it and the number of its row may change."""
-    said = [_moment(body, (name,)) for name in _TIMES]
-    return json.dumps([body["characteristic"], float(body["measured"]), body.get("part"), *map(str, said)])
-
-
-def _moment(body: Mapping[str, Any], names: tuple[str, ...] = _TIMES) -> datetime | None:
-    return next((datetime.fromisoformat(body[name]).astimezone(UTC) for name in names if name in body), None)
-
-
-def _oldest_first(entries: list[Entry]) -> list[Entry]:
-    """The readings in their order, but by their times where the newest of each characteristic stands first.
-
-    One step back alone says nothing: it is a late reading.
-    """
-    times: dict[str, list[datetime]] = {}
-    for entry in entries:
-        if (at := _moment(entry.body)) is None:
-            return entries
-        times.setdefault(entry.body["characteristic"], []).append(at)
-    pairs = [pair for each in times.values() for pair in pairwise(each)]
-    if any(one < two for one, two in pairs) or sum(one > two for one, two in pairs) < STEPS_BACK:
-        return entries
-    upwards = entries[::-1]  # like times stay in this order
-    return sorted(upwards, key=lambda entry: cast("datetime", _moment(entry.body)))
-
-
 class _Reader:
     def __init__(
         self,
@@ -230,7 +188,7 @@ class _Reader:
                 self._text()
             case "aqdef":
                 self._aqdef()
-        self.content.entries = _oldest_first(self.content.entries)
+        self.content.entries = oldest_first(self.content.entries)
         self.content.remarks = self.remarks.sentences()
         self.content.left_out = {name: "; ".join(each.sentences()) for name, each in self.left_out.items()}
 
@@ -470,7 +428,7 @@ class _Reader:
                 column = self.settings.columns.get(field_, field_ if name == EVERY or "measured" in fields else name)
                 self._fault(line, column, f"{error}.", str(value)[:40])
                 return
-        self._add(line, name, body, raw, own)
+        self._add(line, name, body, raw, own, lasting=any(to_the_second(fields.get(name)) for name in TIMES))
 
     def _add(
         self,
@@ -480,21 +438,26 @@ class _Reader:
         raw: Mapping[str, Any],
         own: str | None,
         alone: str | None = None,
+        *,
+        lasting: bool = False,
     ) -> None:
-        """Add a reading. own: the key that its line gives. alone: one that tells it from all others, in whatever file."""
+        """Add a reading. own: the key that its line gives. alone: one that tells it from all others, in whatever file.
+
+        lasting: its meaning tells it from others wherever its line stands.
+        """
         if alone is not None:
             self.content.entries.append(Entry(line, name, body, alone))
             return
         if own is not None:
             place, parts = "own", [own, name]
-        elif body.keys() & set(_TIMES):
-            place, parts = "at", [_meant(body)]
+        elif lasting:
+            place, parts = "at", [meant(body)]
             self.alike[parts[0]] += 1
             parts.append(str(self.alike[parts[0]]))
         else:
             place = str(line)
             parts = [self.prefix[line], name, json.dumps(dict(raw), sort_keys=True, default=str)]
-            if "part" not in body:
+            if not body.keys() & {*TIMES, "part"}:
                 parts.append(self.content.stamp)
         digest = hashlib.sha256("\0".join(parts).encode("utf-8", "replace")).hexdigest()[:32]
         self.content.entries.append(Entry(line, name, body, f"{self.machine.key}:{place}:{digest}"))

@@ -4,7 +4,7 @@ from collections.abc import Iterable, Mapping
 from typing import NamedTuple
 
 from app.bridge.configuration import Configuration, Machine
-from app.bridge.file_content import Entry
+from app.bridge.file_entries import Entry
 from inband_client import AsyncClient, ProblemError
 
 

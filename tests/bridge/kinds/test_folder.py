@@ -382,6 +382,13 @@ def test_a_line_without_a_time_belongs_to_what_stands_above_it(tmp_path: Path) -
     assert not {*first} & {*keys_of(tmp_path, *text, head="part;feature;actual\n", columns=columns)}
 
 
+@pytest.mark.parametrize("time", ["23.11.2026", "23.11.2026 06:05"])
+def test_as_large_a_size_of_the_same_day_or_minute_is_another_part(tmp_path: Path, time: str) -> None:
+    first = keys_of(tmp_path, f"{time};D40;40,01\n", head="time;feature;actual\n", columns=NO_PART)
+    text = f"{time};D40;40,02\n", f"{time};D40;40,01\n"
+    assert not {*first} & {*keys_of(tmp_path, *text, head="time;feature;actual\n", columns=NO_PART)}
+
+
 def test_readings_that_stand_newest_first_come_in_the_order_of_time(tmp_path: Path) -> None:
     def parts(*lines: str) -> list[str]:
         return [each.body["part"] for each in read(tmp_path, HEAD + "".join(lines)).entries]

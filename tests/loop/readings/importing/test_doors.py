@@ -23,7 +23,8 @@ from openpyxl.utils.datetime import MAC_EPOCH, WINDOWS_EPOCH
 
 from app.bridge import file_content
 from app.bridge.configuration import configuration_from
-from app.bridge.file_content import Entry, read_content
+from app.bridge.file_content import read_content
+from app.bridge.file_entries import Entry
 from app.bridge.plausible import Target, far_off
 from app.cli import data
 from app.core.parameters import read
