@@ -428,7 +428,8 @@ class _Reader:
                 column = self.settings.columns.get(field_, field_ if name == EVERY or "measured" in fields else name)
                 self._fault(line, column, f"{error}.", str(value)[:40])
                 return
-        self._add(line, name, body, raw, own, lasting=any(to_the_second(fields.get(name)) for name in TIMES))
+        lasting = any(to_the_second(fields[time]) for time in TIMES if time in body)
+        self._add(line, name, body, raw, own, lasting=lasting)
 
     def _add(
         self,

@@ -389,6 +389,16 @@ def test_as_large_a_size_of_the_same_day_or_minute_is_another_part(tmp_path: Pat
     assert not {*first} & {*keys_of(tmp_path, *text, head="time;feature;actual\n", columns=NO_PART)}
 
 
+def test_a_time_that_is_a_program_s_default_makes_no_line_known(tmp_path: Path) -> None:
+    """It means that there is none, though it is written to the second."""
+    dated, undated = "23.11.2026 06:05:00;D40;40,02\n", "01.01.1970 00:00:00;D40;40,01\n"
+    first, second = (
+        keys_of(tmp_path, *lines, head="time;feature;actual\n", columns=NO_PART)
+        for lines in ((dated, undated), (dated, dated, undated))
+    )
+    assert set(first) & set(second) == {first[0]}
+
+
 def test_readings_that_stand_newest_first_come_in_the_order_of_time(tmp_path: Path) -> None:
     def parts(*lines: str) -> list[str]:
         return [each.body["part"] for each in read(tmp_path, HEAD + "".join(lines)).entries]
