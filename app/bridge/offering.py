@@ -68,6 +68,8 @@ async def _tell_one(unit: Unit, client: AsyncClient, intent: Intent) -> None:
             said = "is in the offset" if outcome.applied else "was refused by the control"
             log.warning("%s: correction %d %s, but %s", key, number, said, error)
             conflict = error
+    if held is None and outcome.applied:
+        held = round(order.after, 6)  # not said, but an order is absolute
     if held is not None and (conflict is not None or outcome.differs):
         await client.report_offset(key, order.tool_memory, held, none_applied=True)
 

@@ -174,10 +174,14 @@ def test_each_answer_is_reported_once(tmp_path: Path, outcome: Outcome, heard: l
     assert server.heard == heard
 
 
-def test_a_correction_that_was_superseded_while_the_control_took_it_is_reported(tmp_path: Path) -> None:
+@pytest.mark.parametrize("offset", [-0.01, None])
+def test_a_correction_that_was_superseded_while_the_control_took_it_is_reported(
+    tmp_path: Path, offset: float | None
+) -> None:
+    """The answer may say no offset, or one of an order that is withdrawn: what was applied is absolute."""
     server = Scripted()
     server.confirming = Conflict("POST applied", "superseded", status=409, **said("conflict"))
-    story(tmp_path, server, answered(Outcome(18, applied=True, offset=-0.01), ORDER, reported=False))
+    story(tmp_path, server, answered(Outcome(18, applied=True, offset=offset), ORDER, reported=False))
     assert server.heard == [("report", 3, -0.01)]
 
 

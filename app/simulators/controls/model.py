@@ -284,7 +284,7 @@ class Model:
         yield
 
     def _has_applied(self, number: int) -> bool:
-        return bool(self.applied) and self.applied[-1].number == number
+        return any(each.number == number for each in self.applied)
 
     def _mailed(self, tool: int, edge: int, parameter: int) -> tuple[int, int, str] | None:
         for feature in self.every:
