@@ -7,7 +7,7 @@ of the wrong sign, another tool or edge that cuts one of them.
 
 **The test**: in the newest corrections of the tool each of the two has asked `FEWEST` times or more, always in its own direction; they
 came in turn; and each mean is `SURE` standard errors from 0 (a t statistic). Wear asks for corrections of one sign. Scatter asks for
-either from both, and an offset that hunts is taken back by whichever is measured next: of simulated lives none is taken for a
+either from both, and an offset that hunts is taken back by whichever is measured next: 2 of 48,000 simulated lives are taken for a
 disagreement (tests/core/test_disagreement.py). Lengths are mm of offset.
 """
 

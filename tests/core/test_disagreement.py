@@ -1,4 +1,4 @@
-"""Two characteristics that want opposite corrections of one tool: found, and never seen in scatter, wear and hunting."""
+"""Two characteristics that want opposite corrections of one tool: found, and hardly ever seen in scatter, wear and hunting."""
 
 import numpy as np
 import pytest
@@ -68,8 +68,10 @@ def life(chance: np.random.Generator, apart: float, parts: int = 150) -> int | N
 
 @runs(40, 4000)
 def test_scatter_wear_and_hunting_are_no_disagreement(runs: int) -> None:
+    """2 of 48,000 lives are taken for one: three of 4,000 come once in a thousand runs."""
     chance = np.random.default_rng(seed(7))
-    assert [life(chance, apart=0.0) for _ in range(runs)] == [None] * runs
+    found = [life(chance, apart=0.0) for _ in range(runs)]
+    assert sum(part is not None for part in found) <= runs // 2000
 
 
 @runs(20, 400)
