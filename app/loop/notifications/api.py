@@ -169,7 +169,7 @@ def get_days_off(session: SessionDep) -> CalendarOut:
 @router.put("/notifications/calendar", responses=problems(412))
 @guarded(get_days_off, calendar_queries.hold_calendar)
 def set_days_off(session: SessionDep, caller: Admin, given: CalendarIn) -> CalendarOut:
-    """Say on which days the plant does not work. Routes that are not open on days off are closed on them."""
+    """Set the days on which the plant does not work. Routes that are not open on days off are closed on them."""
     calendar_actions.set_calendar(session, given, caller)
     return calendar_queries.as_answer(session)
 

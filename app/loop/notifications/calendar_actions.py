@@ -14,7 +14,7 @@ from app.loop.notifications.calendar_schemas import CalendarIn
 
 
 def set_calendar(session: Session, given: CalendarIn, caller: Caller) -> None:
-    """Say when the plant does not work. Raises `Invalid` for a country, or a part of it, whose holidays are not known."""
+    """Set the days on which the plant does not work. Raises `Invalid` for a country, or a part of it, whose holidays are not known."""
     hold_calendar(session, {})
     _check(given)
     row = calendar(session)

@@ -58,15 +58,15 @@ class GroupIn(Body):
 
     name: Text200
     members: Annotated[Numbers, Field(min_length=1, description="Numbers of receivers.")]
-    rota: Annotated[list[TurnIn], Field(max_length=100, description="Who is on duty when; none: nobody ever.")] = Field(
-        default_factory=list
+    rota: Annotated[list[TurnIn], Field(max_length=100, description="Who is on duty and when; empty: nobody is.")] = (
+        Field(default_factory=list)
     )
 
     @model_validator(mode="after")
     def _of_members(self) -> Self:
         for turn in self.rota:
             if not set(turn.receivers) <= set(self.members):
-                raise PydanticCustomError("members", _("names somebody who is not in the group"), {"at": "rota"})
+                raise PydanticCustomError("members", _("names a receiver that is not in the group"), {"at": "rota"})
         return self
 
     def value(self, shifts: Sequence[time]) -> Group:

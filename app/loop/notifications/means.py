@@ -34,7 +34,7 @@ STEP = 10.0
 """Seconds for one step of it: to connect, or to get the next bytes."""
 LONGEST_ANSWER = 300
 UNKNOWN_AUTHORITY = frozenset({18, 19, 20, 21})
-"""Codes of OpenSSL for a certificate of which nobody knows who signed it."""
+"""Codes of OpenSSL for a certificate whose signer is unknown."""
 Result = TypeVar("Result")
 
 

@@ -59,7 +59,7 @@ class StepIn(Body):
     ] = Field(default_factory=list)
 
     @model_validator(mode="after")
-    def _somebody(self) -> Self:
+    def _names_a_receiver(self) -> Self:
         if not (self.receivers or self.groups or self.on_duty):
             raise PydanticCustomError("nobody", _("must name at least one receiver or group"), {"at": "receivers"})
         return self

@@ -62,7 +62,7 @@ def plant_key(database: Database) -> str:
 
 
 def wall_link(database: Database, settings: Settings) -> str:
-    """The link of a wall screen: the same at each start, so that one which is open goes on, until somebody revokes it."""
+    """The link of a wall screen: the same at each start, so that an open one goes on, until it is revoked."""
     path = file_of(settings)
     known = _kept(path)
     with database.begin() as session:

@@ -18,7 +18,7 @@ import psycopg
 from sqlalchemy.exc import DBAPIError, OperationalError
 from sqlalchemy.orm import Session
 
-from app import logs
+from app import __version__, logs
 from app.db.connections import Connections
 from app.db.engine import Database
 from app.db.replica import MustSee, Replica, replica_of
@@ -38,7 +38,7 @@ log = logging.getLogger(__name__)
 
 LONGEST_REST = 1.0  # s
 NAME = "making_reports"  # as periodic jobs have one, where it fails
-PROVED = "proved"
+PROVED = f"proved {__version__}"
 
 
 class Maker:
@@ -136,7 +136,7 @@ def _report_of(session: Session, bundle: Bundle, key: str, by: str) -> Report:
     return queries.report_of(session, current, bundle.request, datetime.now(UTC), by)
 
 
-def told(words: TextIO) -> Settings:
+def settings_from(words: TextIO) -> Settings:
     """Settings of the server; it says as well if its engine has proved itself, which is this one."""
     settings = Settings.model_validate_json(words.readline())
     if words.readline().strip() == PROVED:
@@ -145,11 +145,11 @@ def told(words: TextIO) -> Settings:
 
 
 def main() -> None:
-    """Take what the server tells, then numbers, from standard input."""
+    """Take the settings of the server, then numbers of reports, from standard input."""
     end_with(int(sys.argv[1]))
     answers, sys.stdout = sys.stdout, sys.stderr
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C reaches the whole group; the server ends this process
-    settings = told(sys.stdin)
+    settings = settings_from(sys.stdin)
     logs.configure(settings.log_level, settings.log_format)
     use_zone(settings)
     with Connections(settings.database_url or "", settings.database_patience) as connections:

@@ -29,6 +29,6 @@ def test_that_its_engine_has_proved_itself_and_nothing_else(monkeypatch: pytest.
     monkeypatch.setattr(proof, "_proof", None)
     monkeypatch.setattr(proof, "_begun", None)
     monkeypatch.setattr(proof, "cases", given)
-    assert maker.told(io.StringIO(heard)).timezone == "Asia/Tokyo"
+    assert maker.settings_from(io.StringIO(heard)).timezone == "Asia/Tokyo"
     assert proof.proof().failing == proof.failing() == ()
     assert given.called is (known != "passed"), "it proves for itself what the server does not know, or found wrong"

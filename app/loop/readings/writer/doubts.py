@@ -65,7 +65,7 @@ def follow_statuses(pending: PendingWrites, tool: PendingTool) -> None:
 
 
 def leave_out_answered(pending: PendingWrites, answered: Iterable[tuple[int, int, str, int]]) -> None:
-    """Drop doubts that somebody has answered. answered: machine, tool, why and number of each."""
+    """Drop doubts that have been answered. answered: machine, tool, why and number of each."""
     known = set(answered)
     gone = {id(alarm) for alarm in doubts(pending) if _key(alarm) in known}
     if gone:

@@ -185,7 +185,7 @@ LEFT JOIN LATERAL (
 ) a ON p.after_alarm > 0
 WHERE p.every IS NOT NULL OR p.after_change > 0 OR p.after_alarm > 0
 """  # noqa: S608 - made of constants
-# The doubts that somebody has answered: each is raised once.
+# Doubts that have been answered: each is raised once.
 ANSWERED_DOUBTS = f"""
 SELECT machine_id, tool_memory, data ->> 'why', data ->> 'number' FROM alarm
 WHERE machine_id = ANY($1::int[]) AND characteristic_id IS NULL AND kind = '{DOUBT}' AND acknowledged_at IS NOT NULL
