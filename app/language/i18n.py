@@ -11,12 +11,8 @@ from contextlib import contextmanager
 from contextvars import ContextVar
 from functools import cache
 from gettext import NullTranslations, translation
-from typing import TYPE_CHECKING
 
 from app import HOUSE
-
-if TYPE_CHECKING:
-    from babel import Locale
 
 LOCALE_DIR = HOUSE / "frontend" / "locale"
 DEFAULT_LANGUAGE = "en"
@@ -59,12 +55,6 @@ def speaking(language: str) -> Iterator[None]:
 
 def current_language() -> str:
     return _language.get()
-
-
-def current_locale() -> Locale:
-    from babel import Locale  # late: it takes longer to read than everything else that the command line needs of here
-
-    return Locale.parse(_language.get())
 
 
 def _(message: str) -> str:

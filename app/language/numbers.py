@@ -5,13 +5,16 @@ Lengths come in mm. Deviations, limits and corrections are read in µm, sizes in
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from datetime import UTC, datetime
+from functools import cache
 from math import isclose
+from zoneinfo import ZoneInfo
 
-from babel.dates import format_datetime
+from babel.dates import get_month_names
 from markupsafe import Markup, escape
 
-from app.language.i18n import _, current_locale
+from app.language.i18n import _, current_language
 from app.language.times import is_twice, local, offset, plant_zone
 
 MINUS = "\N{MINUS SIGN}"
@@ -180,13 +183,25 @@ def signed_mm(length_mm: float | None) -> str:
     return NOTHING if length_mm is None else f"{signed(length_mm, 4)}{NO_BREAK_SPACE}mm"
 
 
-def grouped(count: int) -> str:
-    """A count as people read it.
+def grouped(number: float, decimals: int = 0) -> str:
+    """A count, or money, as people read it.
 
-    >>> grouped(9287)
-    '9\u202f287'
+    >>> grouped(9287), grouped(-12), grouped(1234.5, 2)
+    ('9\u202f287', '−12', '1\u202f234.50')
     """
-    return f"{count:,}".replace(",", "\N{NARROW NO-BREAK SPACE}")
+    return f"{number:,.{decimals}f}".replace(",", "\N{NARROW NO-BREAK SPACE}").replace("-", MINUS)
+
+
+def signed_grouped(number: float | None, decimals: int = 0) -> str:
+    """The same with its sign: a balance.
+
+    >>> signed_grouped(2614), signed_grouped(-0.5), signed_grouped(None)
+    ('+2\u202f614', '+0', '–')
+    """
+    if number is None:
+        return NOTHING
+    rounded = round(number, decimals) + 0.0
+    return f"{'+' if rounded >= 0 else ''}{grouped(rounded, decimals)}"
 
 
 def percent(share: float | None, decimals: int = 0) -> str:
@@ -226,12 +241,23 @@ def typed_length(length_mm: float) -> str:
     return f"{length_mm:.9f}".rstrip("0").ljust(len(f"{length_mm:.4f}"), "0")
 
 
-def as_read(moment: datetime, style: str = "seconds") -> str:
-    """A moment in the time zone of the plant, as people read it. Style: `seconds`, `minutes`, `date` or `time`."""
-    there = local(moment)
-    pattern = {"seconds": "d MMM y HH:mm:ss", "minutes": "d MMM y HH:mm", "date": "d MMM y", "time": "HH:mm"}[style]
-    text = format_datetime(there, pattern, tzinfo=plant_zone(), locale=current_locale())
+def as_read(moment: datetime, style: str = "seconds", zone: ZoneInfo | None = None) -> str:
+    """A moment in this time zone, else that of the plant, as people read it. Style: `seconds`, `minutes`, `date` or `time`.
+
+    >>> as_read(datetime(2026, 11, 9, 15, 50, 28, tzinfo=UTC), zone=ZoneInfo("Europe/Berlin"))
+    '9 Nov 2026 16:50:28'
+    """
+    there = moment.astimezone(zone) if zone else local(moment)
+    clock = f"{there:%H:%M:%S}" if style == "seconds" else f"{there:%H:%M}"
+    if style != "time":
+        day = f"{there.day} {_months(current_language())[there.month]} {there.year}"
+    text = clock if style == "time" else day if style == "date" else f"{day} {clock}"
     return f"{text} {offset(there)}" if style != "date" and is_twice(there) else text
+
+
+@cache
+def _months(language: str) -> Mapping[int, str]:
+    return get_month_names("abbreviated", locale=language)
 
 
 def when(moment: datetime | None, style: str = "seconds") -> Markup:

@@ -87,6 +87,7 @@ def environment() -> Environment:
         deserved=lambda of, deviation=None: numbers.deserved(of.half, deviation),
         plain_um=numbers.plain_um,
         signed=numbers.signed,
+        signed_grouped=numbers.signed_grouped,
         beside=numbers.beside,
         fixed=numbers.fixed,
         probability=numbers.probability,

@@ -13,8 +13,17 @@ from typing import Any, Literal
 from zoneinfo import ZoneInfo
 
 from app.language.i18n import _
-from app.language.numbers import LEVELS, MINUS, NO_BREAK_SPACE, NOTHING, decimals_beside, in_percent, signed
-from app.language.times import written
+from app.language.numbers import (
+    LEVELS,
+    MINUS,
+    NO_BREAK_SPACE,
+    NOTHING,
+    as_read,
+    decimals_beside,
+    grouped,
+    in_percent,
+    signed,
+)
 
 Kind = Literal["text", "count", "deviation", "width", "size", "number", "probability", "share", "moment"]
 LONGEST = 500  # letters of a text in a cell
@@ -90,12 +99,12 @@ class Value:
             return NOTHING if self.value is None else ""
         moment, number = self.moment, self.number
         if moment is not None:
-            return written(moment, zone=zone)
+            return as_read(moment, zone=zone)
         if number is None:
             return str(self.value)
         match self.kind:
             case "count":
-                return f"{number:,}".replace(",", NO_BREAK_SPACE).replace("-", MINUS)
+                return grouped(number)
             case "share":  # 99.96 % is not all of them; 99.79 % is 99.8 %
                 text = in_percent(number / 100, 1)
             case "deviation":

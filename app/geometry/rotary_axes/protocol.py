@@ -27,8 +27,8 @@ from app.geometry.rotary_axes.figures import LETTERS, diagram, greatest
 from app.geometry.rotary_axes.queries import RunRow
 from app.geometry.rotary_axes.run_history import in_order, surer
 from app.language.i18n import _, ngettext
-from app.language.numbers import short
-from app.language.times import MINUTES, plant_zone, written
+from app.language.numbers import as_read, short
+from app.language.times import plant_zone
 
 SETTINGS = {
     "Q407": "ball_radius",
@@ -51,7 +51,7 @@ def protocol_of(row: RunRow, made_at: datetime) -> Report:
         name=_("Rotary axes, run {n}").format(n=run.id),
         machine=row.machine.name,
         part="",
-        period=f"{row.machine.name}, {written(run.measured_at, MINUTES)}, {wording.status_word(row.shown)}",
+        period=f"{row.machine.name}, {as_read(run.measured_at, 'minutes')}, {wording.status_word(row.shown)}",
         zone=plant_zone().key,
         made_at=moment(made_at),
         head=_head(row),
@@ -89,7 +89,7 @@ def _outcome(row: RunRow) -> Section:
     warned += [wording.warning(item) for item in row.warnings]
     decided = tuple(
         _("{what} by {who} on {at}: {reason}").format(
-            what=wording.status_word(what), who=item.actor, at=written(item.at, MINUTES), reason=item.reason
+            what=wording.status_word(what), who=item.actor, at=as_read(item.at, "minutes"), reason=item.reason
         )
         for what, item in row.decisions.items()
     )

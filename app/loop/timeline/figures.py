@@ -13,7 +13,8 @@ from typing import Literal
 
 from app.charts import Axis, Bars, Chart, Dots, Note, Panel, Pen, Role, Rule, Series
 from app.language.i18n import _
-from app.language.times import plant_zone, written
+from app.language.numbers import as_read
+from app.language.times import plant_zone
 from app.web.theme import ZONE_SYMBOLS
 
 TOOL_CHANGE = "tool_change"
@@ -114,7 +115,7 @@ def _pointed_at(event: Event) -> str:
 
 def _place_words(at: float | datetime) -> str:
     if isinstance(at, datetime):
-        return f"{written(at)} {plant_zone().key}"
+        return f"{as_read(at)} {plant_zone().key}"
     return _("Reading {n}").format(n=round(at))
 
 

@@ -10,7 +10,7 @@ from app.core.spc.refusal import Reason, Refused
 from app.core.spc.spread import Estimator
 from app.core.spc.stability import Fired, Stability
 from app.language.i18n import _, ngettext
-from app.language.numbers import beside, probability, signed, tolerance_um
+from app.language.numbers import beside, grouped, probability, signed, tolerance_um
 from app.loop.summaries import wording as statistics
 from app.loop.summaries.wording import context_words
 from app.quality.capability import fit_wording as fits
@@ -139,7 +139,7 @@ def ppm(value: float | None) -> str:
     if value is None:
         return "–"
     if value >= 99.5:
-        return f"{round(value):,}".replace(",", "\N{NARROW NO-BREAK SPACE}")
+        return grouped(round(value))
     return f"{value:.1f}" if value >= 0.05 else "<\N{NARROW NO-BREAK SPACE}0.1" if value > 0 else "0"
 
 

@@ -10,7 +10,7 @@ from app.core.natural import half_width
 from app.core.parameters import Parameters
 from app.core.wear import FEWEST, Fit, Towards
 from app.language.i18n import _, ngettext
-from app.language.numbers import NO_BREAK_SPACE, percent, plain_um, signed
+from app.language.numbers import NO_BREAK_SPACE, grouped, percent, plain_um, signed
 
 FAR = 10_000  # parts: further ahead nobody plans, and nothing goes on as it is
 
@@ -47,7 +47,7 @@ def parts_left(forecast: Forecast) -> str:
     if forecast.parts <= 0:
         return _("reached")
     if forecast.parts > FAR:
-        return _("more than {n}").format(n=f"{FAR:,}".replace(",", NO_BREAK_SPACE))
+        return _("more than {n}").format(n=grouped(FAR))
     return f"≈{NO_BREAK_SPACE}{rounded(forecast.parts)} ({interval(forecast)})"
 
 

@@ -7,8 +7,7 @@ from urllib.parse import urlencode
 from sqlalchemy.orm import Session
 
 from app.language.i18n import _, ngettext
-from app.language.numbers import NOTHING, age, plain_um
-from app.language.times import MINUTES, written
+from app.language.numbers import NOTHING, age, as_read, plain_um
 from app.loop.alarm_response.wording import kind_word
 from app.views.shift import queries
 from app.views.shift.queries import Shift
@@ -30,7 +29,7 @@ def shift_words(session: Session, end: datetime, address: str) -> tuple[str, str
             found = queries.shift(session, inside, end)
     except Exception:
         log.exception("the shift until %s cannot be worked out", end)
-        return _("Shift until {end}").format(end=written(end, MINUTES)), f"{link}\n"
+        return _("Shift until {end}").format(end=as_read(end, "minutes")), f"{link}\n"
     return None if found.empty else (_subject(found), f"{_text(found)}\n\n{link}\n")
 
 
@@ -39,8 +38,8 @@ def _subject(found: Shift) -> str:
     assert found.period.end is not None
     parts = ngettext("{n} part", "{n} parts", found.made.parts).format(n=found.made.parts)
     return _("Shift {start} to {end}: {parts}, {outside} out of tolerance").format(
-        start=written(found.period.start, MINUTES),
-        end=written(found.period.end, "%H:%M"),
+        start=as_read(found.period.start, "minutes"),
+        end=as_read(found.period.end, "time"),
         parts=parts,
         outside=found.made.outside,
     )

@@ -745,7 +745,7 @@ class TestShifts:
                 )
             )
         (mail, *_later) = until(lambda: mails[0].to(address))
-        assert mail.startswith("Shift ")
+        assert re.match(r"Shift \d+ \w+ \d{4} \d\d:\d\d to \d\d:\d\d: ", mail)
         assert re.search(r": [1-9]\d* parts?, [1-9]\d* out of tolerance\n", mail)
         assert "https://inband.test/shift?at=" in mail
 

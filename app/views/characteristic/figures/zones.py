@@ -20,8 +20,8 @@ from app.charts import Mark as Drawn
 from app.core.decision.limits import HasLimits, Limits
 from app.core.natural import half_of
 from app.language.i18n import _
-from app.language.numbers import read_um, um
-from app.language.times import plant_zone, written
+from app.language.numbers import as_read, read_um, um
+from app.language.times import plant_zone
 from app.loop.timeline.figures import Event, event_lane
 from app.views.characteristic.figures.blocks import Block, envelope, summed_up
 from app.views.characteristic.figures.by_hand import HandPoint, hand_marks
@@ -167,7 +167,7 @@ def _hover(point: Point, half: float) -> str:
     if point.excluded:
         lines.append(_("excluded from statistics"))
     if point.at is not None:
-        lines.append(f"{written(point.at)} {plant_zone().key}")
+        lines.append(f"{as_read(point.at)} {plant_zone().key}")
     return "<br>".join(lines)
 
 
