@@ -1,4 +1,12 @@
-"""Names of columns that people give them, by the field that they mean: in English, German, Serbian, Slovene and Russian."""
+"""Names of columns that people give them, by the field that they mean: in English, German, Serbian, Slovene and Russian.
+
+What was measured, when, and which part, also in languages in which measuring machines are set: French, Italian, Spanish,
+Portuguese, Polish, Czech, Hungarian, Dutch, Swedish, Turkish, Romanian, Croatian, Japanese, Chinese, Korean.
+"""
+
+import re
+
+from app.files.formats.cell_values import LONGEST_NAME, folded
 
 UPPER_LIMITS = (
     "upper limit", "usl", "upper spec", "upper specification limit", "max size", "obere grenze", "oberer grenzwert", "ogw",
@@ -38,26 +46,49 @@ TEMPERATURES = ("part_temperature", "machine_temperature")
 # Folded: lower case, no accents, no unit. The first of a line is the field's own name.
 NAMES: dict[str, tuple[str, ...]] = {
     "measured": (
-        "measured", "measured value", "measurement", "meas", "value", "actual", "actual value", "size", "diameter",
-        "messwert", "wert", "istwert", "ist", "istmass", "mass", "gemessen", "durchmesser",
+        "measured", "measured value", "measurement", "measurement value", "meas", "meas value", "value", "actual", "actual value",
+        "measured size", "actual size", "actual dimension", "size", "diameter",
+        "messwert", "wert", "istwert", "ist", "istmass", "mass", "gemessen", "gemessener wert", "messergebnis", "durchmesser",
         "izmereno", "izmerena vrednost", "vrednost", "mera", "izmerjeno", "izmerjena vrednost", "meritev", "mere",
         "precnik", "premer", "пречник", "диаметр",
         "измерено", "измерена вредност", "вредност", "мера", "значение", "измеренное значение", "размер", "результат",
+        "mesure", "valeur mesurée", "mesuré", "cote mesurée", "valeur réelle", "cote réelle", "valeur",
+        "valore misurato", "misurato", "misura", "valore effettivo", "valore",
+        "valor medido", "medido", "medida", "medición", "valor real", "medição", "valor",
+        "zmierzono", "wartość zmierzona", "zmierzona wartość", "wartość rzeczywista", "pomiar", "wartość",
+        "naměřeno", "naměřená hodnota", "skutečná hodnota", "hodnota", "mért érték", "mért", "érték",
+        "meetwaarde", "gemeten", "gemeten waarde", "waarde", "mätvärde", "uppmätt", "ölçülen", "ölçülen değer", "ölçüm", "değer",
+        "valoare măsurată", "măsurat", "valoare", "izmjereno", "izmjerena vrijednost", "vrijednost", "mjera",
+        "測定値", "実測値", "测量值", "实测值", "測量值", "實測值", "측정값", "측정치",
     ),
     "measured_at": (
-        "measured at", "time", "timestamp", "date time", "datetime", "date", "date and time", "measured on",
-        "zeit", "zeitpunkt", "zeitstempel", "messzeit", "messzeitpunkt", "datum", "datum uhrzeit", "datum zeit",
-        "vreme", "vreme merenja", "datum i vreme", "cas", "cas meritve", "datum in cas",
-        "време", "време мерења", "датум", "датум и време", "время", "время измерения", "дата", "дата и время",
+        "measured at", "timestamp", "date time", "date and time", "time and date", "time date", "measured on", "measurement time",
+        "measuring time", "measurement date", "measuring date", "time", "date",
+        "zeitstempel", "messzeit", "messzeitpunkt", "messdatum", "gemessen am", "datum uhrzeit", "datum und uhrzeit", "datum zeit",
+        "datum und zeit", "zeitpunkt", "zeit", "datum",
+        "vreme merenja", "datum i vreme", "datum vreme", "vreme", "cas meritve", "datum in cas", "datum cas", "cas",
+        "време мерења", "датум и време", "датум време", "време", "датум",
+        "время измерения", "дата измерения", "дата и время", "дата время", "время", "дата",
+        "date de mesure", "heure de mesure", "date et heure", "date heure", "horodatage",
+        "data e ora", "data ora", "data di misura", "data misura", "fecha y hora", "fecha hora", "fecha de medición",
+        "fecha", "data e hora", "data hora", "data da medição", "data",
+        "data i godzina", "data godzina", "data pomiaru", "czas pomiaru", "czas", "datum a čas", "datum měření", "čas měření",
+        "dátum idő", "mérés ideje", "mérés dátuma", "dátum", "idő", "datum en tijd", "datum tijd", "meetdatum", "tijdstip", "tijd",
+        "datum och tid", "datum tid", "tid", "tarih saat", "ölçüm tarihi", "tarih", "data și ora", "datum i vrijeme", "vrijeme mjerenja",
+        "vrijeme", "測定日時", "日時", "測定日", "測定時刻", "时间", "日期", "日期时间", "测量时间", "時間", "日期時間", "측정일시", "측정시간", "일시",
     ),
     "machined_at": (
         "machined at", "cut at", "bearbeitet", "gefertigt", "gefertigt am", "obradeno", "vreme obrade", "izdelano",
         "cas izdelave", "обрађено", "време обраде", "обработано", "время обработки",
     ),
     "part": (
-        "part", "part number", "part id", "partnb", "serial", "serial number", "sn", "teil", "teilenummer", "teile nr", "seriennummer",
+        "part", "part number", "part no", "part nr", "part id", "partnb", "serial", "serial number", "serial no", "sn", "teil", "teilenummer", "teile nr",
+        "teil nr", "seriennummer", "serien nr",
         "werkstuck", "deo", "komad", "serijski broj", "kos", "obdelovanec", "serijska stevilka",
         "део", "комад", "серијски број", "деталь", "номер детали", "серийный номер",
+        "pièce", "numéro de série", "no de série", "n° de série", "pezzo", "numero di serie", "pieza", "número de serie", "peça", "número de série",
+        "część", "numer seryjny", "díl", "výrobní číslo", "alkatrész", "sorozatszám", "onderdeel", "serienummer", "parça", "seri no", "serijski broj",
+        "部品番号", "ワーク番号", "シリアル番号", "零件号", "工件号", "序列号",
     ),
     "characteristic": (
         "characteristic", "characteristic name", "feature", "feature name", "merkmal", "merkmalsname", "karakteristika",
@@ -95,3 +126,15 @@ NAMES: dict[str, tuple[str, ...]] = {
         "температура станка",
     ),
 }  # fmt: skip
+
+
+_BETWEEN = re.compile(r"(?<=\w)(?: *[/&] *|\+)(?=\w)")
+
+
+def key_of(heading: str) -> str:
+    """A name of a column for comparing: as `folded`, without blanks and without signs between and behind its words.
+
+    >>> key_of("Date/Time"), key_of("Datum & Uhrzeit [UTC]"), key_of("MeasuredValue:"), key_of("+Tol")
+    ('datetime', 'datumuhrzeit', 'measuredvalue', '+tol')
+    """
+    return folded(_BETWEEN.sub(" ", heading[:LONGEST_NAME]).rstrip(" :=")).replace(" ", "")

@@ -5,8 +5,8 @@ from collections.abc import Iterable, Mapping, Sequence
 from functools import lru_cache
 from typing import Any, Final, Literal, get_args
 
-from app.files.formats.cell_values import Unreadable, folded
-from app.files.formats.column_names import NAMES, TEMPERATURES
+from app.files.formats.cell_values import Unreadable
+from app.files.formats.column_names import NAMES, TEMPERATURES, key_of
 from app.language.i18n import _
 
 Unit = Literal["mm", "um", "nm", "cm", "m", "inch", "mil", "tenth", "uin"]
@@ -280,10 +280,10 @@ def agreed(unit: str | None, *words: Any) -> str | None:
 
 @lru_cache(maxsize=4096)
 def _names(name: str, field: str) -> bool:
-    return folded(name) in _COLUMNS[field]
+    return key_of(name) in _COLUMNS[field]
 
 
-_COLUMNS: Final = {field: frozenset(map(folded, NAMES[field])) for field in ("unit", "nominal")}
+_COLUMNS: Final = {field: frozenset(map(key_of, NAMES[field])) for field in ("unit", "nominal")}
 
 
 def is_unit_column(name: str) -> bool:

@@ -11,15 +11,14 @@ from typing import NamedTuple
 
 from app.core.number_text import number_or_none
 from app.files.formats.cell_values import Unreadable as WrongUnit
-from app.files.formats.cell_values import folded
-from app.files.formats.column_names import NAMES
+from app.files.formats.column_names import NAMES, key_of
 from app.files.formats.units import LENGTHS, UnknownUnit, agreed, beside, in_mm, unit_behind, unit_in
 from app.language.i18n import _
 from app.language.numbers import as_typed
 
 MOST_CHARACTERS = 400_000
-_PARTS = {*map(folded, NAMES["part"]), "parts", "teile", "delovi", "kosi", "sample"}
-_SIZES = {*map(folded, NAMES["measured"]), "measurements", "response", "messung", "messwerte"}
+_PARTS = {*map(key_of, NAMES["part"]), "parts", "teile", "delovi", "kosi", "sample"}
+_SIZES = {*map(key_of, NAMES["measured"]), "measurements", "response", "messung", "messwerte"}
 _OPERATORS = {
     "operator",
     "operators",
@@ -146,7 +145,7 @@ def long_columns(heading: Sequence[str]) -> Long | None:
     >>> long_columns(["RunOrder", "Parts", "Operators", "Measurement"]), long_columns(["Operator", "Part", "M1", "M2"])
     (Long(part=1, operator=2, sizes=(3,)), Long(part=1, operator=0, sizes=(2, 3)))
     """
-    names = [folded(each) for each in heading]
+    names = [key_of(each) for each in heading]
 
     def place(words: Collection[str]) -> int | None:
         return next((at for at, name in enumerate(names) if name in words), None)

@@ -3,8 +3,7 @@
 from collections.abc import Mapping, Sequence
 
 from app.errors import FieldError, Invalid
-from app.files.formats import cell_values
-from app.files.formats.column_names import NAMES
+from app.files.formats.column_names import NAMES, key_of
 from app.files.formats.units import in_another_scale
 from app.language.i18n import _
 from app.loop.readings.origin import COLUMNS
@@ -15,10 +14,21 @@ VERDICT = ("code", "excluded")
 """Columns of the same, by which a reading that counted for nothing there does not count here."""
 DRAWN = ("nominal", "upper", "lower", "natural_limit")
 """Fields of a characteristic, not of its readings: they set it up where it is missing."""
-DATES = {"date", "datum", "дата", "датум"}
-FEATURES = {"feature", "feature name", "element", "elementname", "element name", "geometrieelement"}
-AXES = {"axis", "ax", "achse", "osa", "os", "оса", "ось"}
-TIMES = {"time", "zeit", "uhrzeit", "vreme", "cas", "время", "време"}
+_WORDS = {name: [key_of(word) for word in words] for name, words in NAMES.items()}
+DATES = frozenset(map(key_of, (
+    "date", "datum", "дата", "датум", "data", "fecha", "dátum", "tarih", "日付", "日期", "날짜", "measured on", "messdatum",
+)))  # fmt: skip
+FEATURES = frozenset(map(key_of, ("feature", "feature name", "element", "element name", "geometrieelement")))
+AXES = frozenset({"axis", "ax", "achse", "osa", "os", "оса", "ось"})
+TIMES = frozenset(map(key_of, (
+    "time", "zeit", "uhrzeit", "vreme", "cas", "време", "время", "vrijeme", "heure", "ora", "hora", "godzina", "czas", "idő", "időpont",
+    "tijd", "tid", "saat", "時刻", "時間", "时间", "시간", "messzeit", "time of day", "clock",
+)))  # fmt: skip
+_TOLERANCES = frozenset(map(key_of, (
+    "tol", "tolerance", "toleranz", "tolerancija", "toleranca", "допуск", "толеранција", "tolérance", "tolleranza", "tolerancia",
+    "tolerância", "tolerancja", "tolerantie", "tolerans", "公差", "공차",
+)))  # fmt: skip
+"""Columns that are both deviations where their cells say so: ±0.05."""
 
 
 def columns_of(header: tuple[str, ...], mapping: Mapping[str, str]) -> dict[str, tuple[int, ...]]:
@@ -92,22 +102,30 @@ def is_unsigned(column: str) -> bool:
     return column.strip().lower().replace(" ", "") in {"-tol", "tol-", "-tolerance"}
 
 
-def is_both_ways(column: str) -> bool:
-    """Tell of one column for both deviations, the same up and down: ±TOL.
+def is_both_ways(text: str) -> bool:
+    """Tell of one column, or one cell, for both deviations, the same up and down: ±TOL.
 
     >>> is_both_ways("±Tol"), is_both_ways("Tol. +/- [mm]"), is_both_ways("+TOL"), is_both_ways("Tol")
     (True, True, False, False)
     """
-    return "±" in column or "+/-" in column
+    return "±" in text or "+/-" in text or "+-" in text
+
+
+def is_tolerance(column: str) -> bool:
+    """Tell of a column that does not say which limit it gives.
+
+    >>> is_tolerance("Tol. [mm]"), is_tolerance("-Tol"), is_tolerance("+Tol")
+    (True, False, False)
+    """
+    return key_of(column) in _TOLERANCES and not is_unsigned(column)
 
 
 def guesses_of(header: tuple[str, ...]) -> dict[str, tuple[int, ...]]:
     """The fields that the names of columns mean."""
-    names = [cell_values.folded(name) for name in header]
+    names = [key_of(name) for name in header]
     guesses: dict[str, tuple[int, ...]] = {}
-    for name, words in NAMES.items():
-        folded = [cell_values.folded(word) for word in words]
-        ranked = sorted((folded.index(each), place) for place, each in enumerate(names) if each in folded)
+    for name, words in _WORDS.items():
+        ranked = sorted((words.index(each), place) for place, each in enumerate(names) if each in words)
         if ranked:
             guesses[name] = (ranked[0][1],)
     date = next((place for place, each in enumerate(names) if each in DATES), None)
@@ -117,7 +135,7 @@ def guesses_of(header: tuple[str, ...]) -> dict[str, tuple[int, ...]]:
     unsigned = [at for at, name in enumerate(header) if is_unsigned(name)]
     if "lower" not in guesses and unsigned:
         guesses["lower"] = (unsigned[0],)
-    both = [at for at, name in enumerate(header) if is_both_ways(name)]
+    both = [at for at, name in enumerate(header) if is_both_ways(name) or is_tolerance(name)]
     if both and not {"upper", "lower"} & guesses.keys():
         guesses |= {"upper": (both[0],), "lower": (both[0],)}
     features = [at for at, each in enumerate(names) if each in FEATURES]

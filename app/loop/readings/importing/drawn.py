@@ -9,7 +9,7 @@ from app.files.formats.column_names import LOWER_LIMITS, UPPER_LIMITS
 from app.files.formats.units import UnknownUnit, agreed, in_mm, unit_in, unit_of_name
 from app.language.i18n import _
 from app.loop.readings.aqdef.matching import Content, not_new
-from app.loop.readings.importing.columns import is_both_ways, is_unsigned
+from app.loop.readings.importing.columns import is_both_ways, is_tolerance, is_unsigned
 from app.loop.readings.importing.layout import Drawn, Layout
 
 _SIZES = frozenset(map(folded, (*UPPER_LIMITS, *LOWER_LIMITS)))
@@ -58,8 +58,15 @@ def _limits(name: str, drawn: Drawn, layout: Layout) -> tuple[float | None, floa
     if drawn.other:
         words = _("lines {first} and {other} give it different limits, nominal sizes or units")
         raise _Wrong(words.format(first=drawn.line, other=drawn.other))
-    nominal, lower, upper = (_length(name, drawn, layout, side) for side in ("nominal", "lower", "upper"))
     both = is_both_ways(layout.named("lower"))
+    if drawn.lower and is_tolerance(layout.named("lower")):
+        if not is_both_ways(drawn.lower):
+            words = _(
+                "its {column} {said!r} may be half the tolerance or all of it: write ±, or a column for each limit"
+            )
+            raise _Wrong(words.format(column=layout.named("lower"), said=drawn.lower[:40]))
+        both = True
+    nominal, lower, upper = (_length(name, drawn, layout, side) for side in ("nominal", "lower", "upper"))
     if (both or is_unsigned(layout.named("lower"))) and lower is not None:
         lower = -abs(lower)
         upper = -lower if both else upper
@@ -84,7 +91,7 @@ def _limits(name: str, drawn: Drawn, layout: Layout) -> tuple[float | None, floa
 
 
 def _length(name: str, drawn: Drawn, layout: Layout, field: str) -> float | None:
-    text = getattr(drawn, field).removeprefix("±").removeprefix("+/-")
+    text = getattr(drawn, field).removeprefix("±").removeprefix("+/-").removeprefix("+-")
     if not text:
         return None
     try:

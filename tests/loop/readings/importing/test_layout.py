@@ -49,9 +49,16 @@ def write(tmp_path: Path, text: str, encoding: str = "utf-8", name: str = "file.
         ("Izmerjena vrednost;Čas meritve;Kos", "39,998;2026-11-20 08:00:00;Дугме"),
         ("Значение|Дата и время|Серийный номер", "39,998|20.11.2026 08:00|Дугме"),
         ("Wert [µm];Zeitstempel;Seriennummer", "39998;2026-11-20T08:00:00Z;Дугме"),
+        ("Ist;Datum/Uhrzeit;Teil-Nr.", "39,998;20.11.2026 08:00:00;Дугме"),
+        ("MeasuredValue;Date & Time;Part No.", "39.998;2026-11-20 08:00:00;Дугме"),
+        ("Valeur mesurée [mm];Date de mesure;Pièce", "39,998;20.11.2026 08:00;Дугме"),
+        ("Cycle time;Date/Time;Valore misurato;Numero di serie", "12;20.11.2026 08:00;39,998;Дугме"),
+        ("Pieza;Medida;Fecha;Hora", "Дугме;39,998;20.11.2026;08:00"),
+        ("Wartość zmierzona:;Data pomiaru:;Część:", "39,998;2026-11-20 08:00;Дугме"),
+        ("測定日時,測定値,部品番号", "2026/11/20 08:00,39.998,Дугме"),
     ],
 )
-def test_files_in_five_languages_are_understood_by_their_headers(tmp_path: Path, header: str, row: str) -> None:
+def test_files_in_many_languages_are_understood_by_their_headers(tmp_path: Path, header: str, row: str) -> None:
     path = write(tmp_path, f"{header}\n{row}\n")
     assert good(path, timezone="UTC") == [(39.998, "Дугме")]
     first = read(path, timezone="UTC")[0]
