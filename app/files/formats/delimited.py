@@ -29,6 +29,7 @@ END = "END"  # alone in a row: so CALYPSO closes its tables
 SAMPLE = 64 * 1024
 AT_ONCE = 30  # lines that are compared
 LOOKED_AT = 1_000_000  # bytes from which an encoding is guessed
+_IN_QUOTES = str.maketrans(";\t,|\r\n", "  .   ")  # signs that part nothing there; a comma may be of a number
 _SIGNS_OF_ALL = "°±µ²³×·–—„“”‚‘’…€§«»\N{NO-BREAK SPACE}"
 _LATIN = "äöüÄÖÜß" + _SIGNS_OF_ALL
 # The common letters of German, of Serbian and Slovene, and of Cyrillic; rare ones would only confuse.
@@ -110,11 +111,13 @@ def delimiter_of(path: Path, encoding: str) -> str:
     sample = _beginning(path, encoding)
     if announced := re.match(r"sep=(.)\r?\n", sample):  # spreadsheets write this
         return announced[1]
-    unquoted = re.sub(r'"(?:[^"]|"")*"', "", sample)
+    unquoted = re.sub(r'"(?:[^"]|"")*"', lambda quoted: quoted[0][1:-1].translate(_IN_QUOTES), sample)
     lines = [line for line in unquoted.splitlines() if line.strip()]
     lines = [line for line in lines if not line.lstrip().startswith("#")] or lines
     if len(sample) == SAMPLE and len(lines) > 1:
         lines = lines[:-1]  # cut off in the middle, perhaps
+    if lines and all(_is_number(line) or not any(sign in line for sign in DELIMITERS) for line in lines):
+        return ";"  # one column: a comma is of a number
     first = None
     for begin in range(0, len(lines), AT_ONCE):  # a long preamble above the table has no values between them
         some = lines[begin : begin + AT_ONCE]
