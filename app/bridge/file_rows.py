@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 
 from app.bridge.json_text import read_json
 from app.files.formats import delimited
-from app.files.formats.headings import TOP, Heading, as_wide, heading, others
+from app.files.formats.headings import TOP, Heading, as_wide, heading, is_labelled, others
 from app.files.formats.repeats import Remark, Repeats
 from app.files.formats.units import LENGTHS, is_unit_column, unit_above, unit_in
 
@@ -115,7 +115,7 @@ def labels_of(fields: Mapping[str, Any], row: Mapping[str, Any]) -> list[Any]:
     """The cells of a row that name its part, or would in any other row: the first one, and those of part and time."""
     first = next((value for value in row.values() if value is not None and str(value).strip()), None)
     sizes = (fields.get("measured"), fields.get("characteristic"))
-    named = [fields.get("part"), fields.get("measured_at")]
+    named = [fields.get("part"), fields.get("measured_at"), *filter(is_labelled, [fields.get("measured")])]
     a_shift = any(named) and len(str(first).strip()) == 1 and first not in named  # S and N are shifts as well
     return named if first in sizes or a_shift else [*named, first]
 

@@ -1,5 +1,6 @@
 """Headings of tables: below titles, in lines of their own, with cells that are merged across and downwards."""
 
+import re
 from collections.abc import Iterator, Sequence
 from itertools import accumulate
 from typing import NamedTuple
@@ -12,6 +13,8 @@ from app.files.formats.units import OTHER_UNITS, is_unit_column, length_unit
 
 TOP = 500  # rows in which the heading is looked for
 FIRST = 50  # of them, in which another may stand than the one that is found
+_WITH_VALUE = re.compile(r"([^:=]{1,40}?) ?= ?\S.{0,40}|([^:=]{2,40}?) ?: ?\S.{0,40}")
+"""A label and its value in one cell; a single letter before a colon may be the number of a part."""
 TABLE = 2  # rows of values that make a table
 
 
@@ -83,8 +86,23 @@ def is_summary(label: object) -> bool:
 
     >>> is_summary("Mean:"), is_summary("Std. Dev."), is_summary("P-17"), is_summary(None)
     (True, True, False, False)
+    >>> is_summary("Anzahl: 2"), is_summary("s = 0,002"), is_summary("N:12")
+    (True, True, False)
     """
-    return label is not None and folded(str(label).rstrip(" :=")) in SUMMARIES
+    if label is None:
+        return False
+    text = str(label).strip()
+    with_value = _WITH_VALUE.fullmatch(text)
+    return folded(with_value[1] or with_value[2] if with_value else text.rstrip(" :=")) in SUMMARIES
+
+
+def is_labelled(cell: object) -> bool:
+    """Tell of a cell that has a label before its value.
+
+    >>> is_labelled("Mean: 40.002"), is_labelled("40.002 mm"), is_labelled("n")
+    (True, False, False)
+    """
+    return _WITH_VALUE.fullmatch(str(cell).strip()) is not None
 
 
 def as_wide(row: Row, width: int) -> Row:

@@ -17,7 +17,7 @@ from app.files.formats import cell_values, delimited, spreadsheet
 from app.files.formats.cell_values import Unreadable, same_number
 from app.files.formats.column_names import TEMPERATURES
 from app.files.formats.delimited import Row, Unusable
-from app.files.formats.headings import is_summary
+from app.files.formats.headings import is_labelled, is_summary
 from app.files.formats.units import agreed, in_mm, unit_behind, unit_of_name
 from app.language.i18n import _
 from app.loop.readings.importing.columns import DRAWN, ORIGIN, VERDICT
@@ -204,6 +204,7 @@ def _labels(cells: Sequence[str], layout: Layout) -> list[str]:
     first = next((place for place, cell in enumerate(cells) if cell.strip()), 0)
     of_part = {*layout.columns.get("part", ()), *layout.columns.get("measured_at", ())} - sizes
     named = [cells[place].strip() for place in of_part]
+    named += [cells[place] for place in layout.columns.get("measured", ()) if is_labelled(cells[place])]
     if first in sizes | of_part or (any(named) and len(cells[first].strip()) == 1):
         return named  # S and N are shifts as well
     return [*named, cells[first].strip()]
