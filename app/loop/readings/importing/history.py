@@ -151,6 +151,7 @@ class Summary:
     corrections: int = 0
     alarms: int = 0
     zones: dict[str, int] = field(default_factory=dict)
+    first: tuple[int, float] = (0, 0.0)  # line and size of the first reading
     first_at: datetime | None = None
     last_at: datetime | None = None
     untimed: list[int] = field(default_factory=list)  # lines without a time, the first of them
@@ -341,6 +342,8 @@ def nothing_in(notes: Sequence[str]) -> Invalid:
 
 
 def _count(summary: Summary, row: tuple[Any, ...]) -> None:
+    if not summary.lines:
+        summary.first = row[0], row[2]
     summary.lines += 1
     measured_at, zone = row[6], row[8]
     summary.zones[zone] = summary.zones.get(zone, 0) + 1
@@ -352,14 +355,15 @@ def _refuse_something_else(summary: Summary, parameters: Parameters) -> None:
     """Every single value beyond R36 is not a fault of a probe, it is another column, unit or characteristic."""
     if summary.zones.get(Zone.PROBE_FAULT.value, 0) < summary.lines:
         return
+    line, size = summary.first
     raise Invalid(
-        _("Every value lies more than {limit:g} mm (R36) from the target {target:g} mm.").format(
-            limit=parameters.confidence_limit, target=parameters.target
-        ),
+        _(
+            "Every value lies more than {limit:g} mm (R36) from the target {target:g} mm, the first one in line {line} with {size:g} mm."
+        ).format(limit=parameters.confidence_limit, target=parameters.target, line=line, size=size),
         _(
             "Nothing was imported. Is it the right characteristic and the right column? If the values are not in mm, name their unit."
         ),
-        errors=[FieldError("measured", _("no value is near the target"))],
+        errors=[FieldError(_("line {line}").format(line=line) + ", measured", _("no value is near the target"))],
     )
 
 
