@@ -187,6 +187,23 @@ class Folder(OneWay):
     # --- in the thread
 
     def _try_out(self) -> list[str]:
+        return [words for words in (self._files_moved(), self._decision_written()) if words]
+
+    def _decision_written(self) -> str:
+        """What keeps the file of decisions from being written."""
+        if self.settings.decisions is None:
+            return ""
+        place = Path(self.settings.decisions)
+        probe = place.with_name(f".inband-check-{os.getpid()}.tmp")
+        try:
+            write_new(probe, b"")
+            probe.unlink()
+        except OSError as error:
+            return f"A decision to stop cannot be written to {place} ({error.strerror or error}): the bridge needs the right to write in {place.parent}."
+        return ""
+
+    def _files_moved(self) -> str:
+        """What keeps files from being made and moved."""
         probe = self.path / f".inband-check-{os.getpid()}.tmp"
         made = []
         try:
@@ -198,17 +215,16 @@ class Folder(OneWay):
                     made.append(folder)
                 probe = probe.rename(self._plain_folder(name) / probe.name)
         except OSError as error:
-            words = (
+            return (
                 f"A file cannot be written and moved in {self.path} ({error.strerror or error}): the bridge needs the right to"
                 " write there, and in done and failed, which lie on the same disk or share. Nothing could be taken."
             )
-            return [words]
         finally:
             with contextlib.suppress(OSError):
                 probe.unlink(missing_ok=True)
                 for folder in made:
                     folder.rmdir()
-        return []
+        return ""
 
     def _plain_folder(self, name: str) -> Path:
         folder = self.path / name
