@@ -63,7 +63,7 @@ class Process(Model):
 
     amiss: as sure as factor, sign and unit may be wrong at the control, what a correction does there; 1: what it says. swapped: tools
     whose offsets it takes for each other's. blind: the first part of which the probe does not see the first characteristic, 0: none.
-    start: deviation of the first part, mm. more: whether mail may still come, so that the program does not wait in vain.
+    start: deviation of the first part, mm. obeys: by REST, it cuts no part more once an answer says stop. more: whether mail may still come, so that the program does not wait in vain.
     """
 
     sizes: dict[int, list[float]] = field(default_factory=dict)
@@ -73,6 +73,7 @@ class Process(Model):
     swapped: dict[int, int] = field(default_factory=dict)
     blind: int = 0
     start: float = 0.0
+    obeys: bool = False
     more: Callable[[], bool] = bool
 
     def take_corrections(self) -> Steps:
@@ -202,20 +203,24 @@ class Play:
         process = self.process
 
         in_effect: dict[int, int] = {}
+        stopped = False
         for part in range(1, self.parts + 1):
+            if stopped and process.obeys:
+                break
             process.parts += 1
             for each in process.features:
                 feature = process.cut_now(each)
                 size = process.size(feature)
                 failed = feature.number == 1 and 0 < process.blind <= part
                 found: dict[str, Any] = {"touches": []} if failed else {"measured": round(size, 6)}
-                self.call(
+                answer = self.call(
                     "POST",
                     "/readings",
                     characteristic=self.keys[feature.number],
                     correction_in_effect=in_effect.get(feature.tool, 0),
                     **found,
                 )
+                stopped = stopped or answer["action"] == "stop"
                 if wait == 0:
                     self._apply(feature.tool, in_effect)
             if wait and part % wait == 0:

@@ -148,12 +148,23 @@ def test_a_wrong_sign_goes_no_further_than_two_corrections(server: Server, tmp_p
     assert {number for number, part in found.out if part == 1} <= {2, 4}, "what another one of the part corrected"
 
 
+def test_a_machine_that_obeys_cuts_no_series_with_a_wrong_sign(server: Server, tmp_path: Path) -> None:
+    """The paused tool brings no part back: at the first one that is out then, the answer is to stop."""
+    one, found = mistaken(server, "rest", 60, tmp_path, eventful=False, amiss=-1.0, start=START, obeys=True)
+    assert one.process.parts <= 4
+    assert max(Counter(number for number, _ in found.out).values()) <= 3
+    said = one.call("GET", f"/alarms?state=active&kind=opposite_effect&machine={one.machine}")["items"]
+    assert said
+    assert all("asks the machine to stop" in each["text"] for each in said)
+
+
 @pytest.mark.long
 @pytest.mark.parametrize("kind", sorted(KINDS))
 def test_a_wrong_sign_goes_no_further_behind_a_bridge(server: Server, tmp_path: Path, kind: str) -> None:
     """Nor at the sister that goes on, nor at the tool that was changed."""
     one, found = mistaken(server, kind, 12, tmp_path, amiss=-1.0, start=START)
     assert applied(one) == dict.fromkeys((1, 2, 3, 4, 5, 7), 2)
+    assert Told.STOP in one.process.told, "the simulated machine goes on all the same"
     assert alarms(one)["opposite_effect"] == {1, 2, 3, 4, 5, 7}
     assert found.worst < 6 * START
 

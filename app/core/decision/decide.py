@@ -11,6 +11,9 @@ wear               < R36          computed in full, held, alarm               un
 probe fault        >= R36         none, alarm, the decision is to stop        unchanged
 =================  =============  ==========================================  ====================
 
+**Where nothing may be corrected** - compensation is paused, or the sum of the corrections has come to its limit - a part out of
+tolerance is one of a series, for nothing brings the next one back: the decision is to stop.
+
 ``M_new = M_old - M_old/k + D/k`` from 0: an exponentially weighted average with lambda = 1/k (R29).
 
 **No double correction.** Parts already cut when a correction is issued come out with the old

@@ -175,6 +175,12 @@ def exceeds(total: float, amount: float, limit: float) -> bool:
     return after > nanometres(limit) and after > abs(nanometres(total))
 
 
+def uncorrected(rules: Rules, deviation: float, decided: float, zone: int) -> int:
+    """Return the action where nothing may bring the size back: to stop for a part out of tolerance, for the next will be as well."""
+    out = zone > FULL and not within(nanometres(judged_size(rules, deviation, decided)), rules.tolerance)
+    return STOP if out and not rules.measures_only else NONE
+
+
 def without_correction(
     decided: float, zone: int, code: int, average: float, action: int = NONE, jumped: bool = False
 ) -> Step:
@@ -210,8 +216,9 @@ def step(
         zone = FAULT
     if zone == FAULT:
         return without_correction(decided, zone, PROBE_FAULT if fault == BELIEVED else fault, before, STOP)
+    lost = NONE if by_hand else uncorrected(rules, deviation, decided, zone)
     if paused:
-        return without_correction(decided, zone, PAUSED, before)
+        return without_correction(decided, zone, PAUSED, before, NONE if previous_tool else lost)
     if previous_tool:
         return without_correction(decided, zone, BEFORE_TOOL_CHANGE, before)
     if rejected and not rules.rejected_may_correct:
@@ -255,5 +262,5 @@ def step(
     if clamped:
         amount = rules.max_step if amount > 0 else -rules.max_step
     if exceeds(total, amount, rules.max_total):
-        return without_correction(decided, zone, OFFSET_LIMIT, without, jumped=jumped)
+        return without_correction(decided, zone, OFFSET_LIMIT, without, lost, jumped)
     return Step(decided, zone, code, after, action, size_error, amount, clamped, jumped)

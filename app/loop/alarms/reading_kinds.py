@@ -1,6 +1,6 @@
 """Alarm kinds that a reading raises: the signals of the decision (`app.core.decision.decide.ReadingAlarm`)."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import Any
 
 from sqlalchemy import select
@@ -133,6 +133,16 @@ def cannot_be_stopped(alarm: Alarm) -> str:
     return " " + _("This machine cannot be stopped by Inband: stop it by hand.")
 
 
+def uncorrected(sentence: Callable[[Alarm], str]) -> Callable[[Alarm], str]:
+    """The sentence of an alarm that lets nothing be corrected, with what becomes of the machine meanwhile."""
+
+    def worded(alarm: Alarm) -> str:
+        meanwhile = _("Meanwhile a part out of tolerance asks the machine to stop.")
+        return f"{sentence(alarm)} {meanwhile}{cannot_be_stopped(alarm)}"
+
+    return worded
+
+
 PROBE_FAULT = register(
     AlarmKind(
         "probe_fault",
@@ -161,12 +171,14 @@ OFFSET_LIMIT = register(
         "offset_limit",
         concerns_parts=True,
         word=lambda: _("Offset limit"),
-        sentence=lambda alarm: _deviation(
-            alarm,
-            _(
-                "The corrections of tool {tool} have come to their limit {limit} in all: nothing more is corrected that would "
-                "exceed it."
-            ),
+        sentence=uncorrected(
+            lambda alarm: _deviation(
+                alarm,
+                _(
+                    "The corrections of tool {tool} have come to their limit {limit} in all: nothing more is corrected that would "
+                    "exceed it."
+                ),
+            )
         ),
         what_to_do=lambda: _(
             "Change the tool, or look for what drifts. If the limit is too narrow, an engineer raises the largest sum in Set-up."

@@ -101,7 +101,7 @@ class WhySo(BaseModel):
     notes: Annotated[
         list[str],
         Field(
-            description="What else was considered: outstanding, part_out_of_tolerance, clamped, empirical_value, late, inches."
+            description="What else was considered: outstanding, part_out_of_tolerance, stops, clamped, empirical_value, late, inches."
         ),
     ]
 

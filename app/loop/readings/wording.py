@@ -7,7 +7,7 @@ from typing import Any
 
 from app.core.context import ContextField
 from app.core.decision.limits import Zone, nanometres, within_tolerance
-from app.core.decision.step import Code, average_of
+from app.core.decision.step import Action, Code, average_of
 from app.core.parameters import Feature, Parameters
 from app.core.plausibility import looks_like_inches, looks_like_micrometres
 from app.core.probing import TouchError, Touches, measured_value
@@ -62,6 +62,7 @@ def _notes(record: Record, parameters: Parameters, amount: float | None) -> tupl
             and record.zone in (Zone.ZERO, Zone.AVERAGE, Zone.FULL)
             and not within_tolerance(record.deviation, parameters.limits),
         ),
+        ("stops", record.action == Action.STOP and record.zone != Zone.PROBE_FAULT),
         ("clamped", amount is not None and nanometres(abs(amount)) < nanometres(abs(parameters.factor * size_error))),
         ("empirical_value", nanometres(empirical_value(record, parameters)) != 0),
         ("late", record.late),
@@ -288,6 +289,8 @@ def _note(code: str, values: _Values) -> str:
             )
         case "part_out_of_tolerance":
             return _("The part itself is out of tolerance by its deviation of %(raw)s.") % values
+        case "stops":
+            return _("The part is out of tolerance, and nothing brings the next one back: the decision is to stop.")
         case "clamped":
             return _("The correction is limited to the largest step %(step)s.") % values
         case "inches":

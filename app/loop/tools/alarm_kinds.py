@@ -5,7 +5,7 @@ from datetime import datetime
 from app.language.i18n import _, ngettext
 from app.language.numbers import PLUS_MINUS, age, as_read, fixed, mm, signed, um, um_limit
 from app.loop.alarms.kinds import AlarmKind, register
-from app.loop.alarms.reading_kinds import moved_by
+from app.loop.alarms.reading_kinds import moved_by, uncorrected
 from app.loop.tables.alarms import Alarm
 from app.loop.tables.tools import DOUBT, EARLY, OPPOSITE
 
@@ -67,7 +67,7 @@ OPPOSITE_EFFECT = register(
         OPPOSITE,
         concerns_parts=True,
         word=lambda: _("Opposite effect"),
-        sentence=_opposed,
+        sentence=uncorrected(_opposed),
         what_to_do=lambda: _(
             "Check the sign of the factor of the characteristic, the sign and the offset register at the control, and which tool "
             "cuts it. Then answer the alarm: corrections before it no longer count."
@@ -111,7 +111,7 @@ EARLY_EFFECT = register(
         EARLY,
         concerns_parts=True,
         word=lambda: _("Early effect"),
-        sentence=_early,
+        sentence=uncorrected(_early),
         what_to_do=lambda: _(
             "Set the clock of the machine, or send correction_in_effect in place of machined_at; confirm each correction before the "
             "next part is cut. Then answer the alarm: what was before it no longer counts."
@@ -173,7 +173,7 @@ OFFSET_DIFFERS = register(
         "offset_differs",
         concerns_parts=True,
         word=lambda: _("Offset differs"),
-        sentence=_differs,
+        sentence=uncorrected(_differs),
         what_to_do=lambda: _("Read the true offset at the control and report it."),
         actions=("offset_set", "tool_replaced"),
         comments={

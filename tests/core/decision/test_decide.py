@@ -113,10 +113,25 @@ def test_without_a_memory_location_k_damps_to_a_kth(shaft: Made) -> None:
 
 
 def test_while_paused_it_is_judged_but_nothing_is_corrected(shaft: Made) -> None:
-    decision = decide(shaft(), LoopState(0.0012, paused=True), 0.009)
-    assert (decision.zone, decision.action, decision.code) == (Zone.OVERSIZE, Action.NONE, Code.PAUSED)
+    decision = decide(shaft(), LoopState(0.0012, paused=True), 0.0061)
+    assert (decision.zone, decision.action, decision.code) == (Zone.FULL, Action.NONE, Code.PAUSED)
     assert decision.amount is None
     assert decision.average_after == 0.0012
+
+
+@pytest.mark.parametrize("deviation", [0.009, -0.009, 0.4])
+def test_a_part_out_of_tolerance_that_nothing_brings_back_stops_the_machine(shaft: Made, deviation: float) -> None:
+    """Paused, or at the largest sum: the next parts are out as well."""
+    paused = LoopState(0.0012, paused=True)
+    decision = decide(shaft(), paused, deviation)
+    assert (decision.action, decision.code, decision.amount) == (Action.STOP, Code.PAUSED, None)
+    assert decision.average_after == 0.0012
+    assert decision.alarms
+    assert decide(shaft(), paused, deviation, previous_tool=True).action is Action.NONE, "of the offset before"
+    assert decide(shaft(), paused, deviation, outstanding=-deviation).action is Action.NONE, "corrected since"
+    assert decide(shaft(mode=Mode.MEASURE_ONLY.value), paused, deviation).action is Action.NONE, "as without a pause"
+    limited = decide(shaft(max_total=0.001), LoopState(), deviation)
+    assert (limited.action, limited.code) == (Action.STOP, Code.OFFSET_LIMIT)
 
 
 def test_measure_only_runs_the_average_and_alarms_but_never_corrects(shaft: Made) -> None:

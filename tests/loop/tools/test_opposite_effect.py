@@ -110,7 +110,7 @@ def test_resumed_without_a_remedy_it_takes_two_again(loop: Loop) -> None:
         loop.part()
     (alarm,) = [each for each in loop.shop.alarms() if each["kind"] == "opposite_effect"]
     loop.shop.acknowledge(alarm["id"], "noted")
-    assert [loop.part()["action"] for _part in range(3)] == ["correct", "correct", "none"]
+    assert [loop.part()["action"] for _part in range(3)] == ["correct", "correct", "stop"]
 
 
 @pytest.mark.parametrize("happens", ["edit", "change"])
@@ -121,7 +121,7 @@ def test_an_edit_and_a_tool_change_begin_the_evidence_again(loop: Loop, happens:
         loop.shop.call("PUT", f"/machines/{loop.shop.machine}/tools/4", offset=loop.offset, reason="looked at")
     else:
         loop.shop.call("POST", f"/machines/{loop.shop.machine}/tools/4/change", offset=loop.offset, reason="new")
-    assert [loop.part()["action"] for _part in range(3)] == ["correct", "correct", "none"]
+    assert [loop.part()["action"] for _part in range(3)] == ["correct", "correct", "stop"]
 
 
 @pytest.mark.parametrize(

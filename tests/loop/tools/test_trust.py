@@ -47,8 +47,15 @@ class TestOffsetDiffers:
         alarm = reported_otherwise(shop)
         assert "No offset of this tool was entered before" in alarm["text"]
         assert shop.tool()["paused_by"] == alarm["id"]
-        answer = shop.read(20.0)
+        answer = shop.read(7.0)
         assert (answer["action"], answer["correction"], answer["reason"]["code"]) == ("none", None, "paused")
+        out = shop.read(20.0)
+        assert (out["action"], out["correction"], out["reason"]["code"]) == ("stop", None, "paused")
+        assert out["reason"]["notes"] == ["stops"]
+        assert "nothing brings the next one back: the decision is to stop" in out["reason"]["text"]
+        assert shop.read(0.5)["action"] == "none", (
+            "the reading that stops is no probe fault: the characteristic goes on"
+        )
         assert f"paused by alarm {alarm['id']}" in answer["reason"]["text"]
         shop.add(f"{shop.characteristic}-b", average_memory=6)
         assert shop.read(20.0, f"{shop.characteristic}-b")["reason"]["code"] == "paused"  # the same tool

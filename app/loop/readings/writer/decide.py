@@ -11,6 +11,7 @@ from datetime import UTC, datetime
 from functools import partial
 
 from app.core.decision.decide import Decision, LoopState, ReadingAlarm, decide, needs_approval, outstanding_effect
+from app.core.decision.limits import Zone
 from app.core.decision.step import DECIMALS, Action, Code, deviation_of
 from app.core.natural import NaturalLimit
 from app.core.parameters import Parameters
@@ -164,7 +165,7 @@ def _move_along(verdict: Verdict, course: float | None, *, jump: bool) -> None:
     if average is not None and average.average != decision.average_after:
         average.average = decision.average_after
         average.changed = True
-    stops = decision.action is Action.STOP
+    stops = decision.zone is Zone.PROBE_FAULT
     if stops and stream.paused_by is None:
         stream.paused_by = next(alarm for alarm in verdict.alarms if alarm.kind == ReadingAlarm.PROBE_FAULT.value)
     if verdict.late:

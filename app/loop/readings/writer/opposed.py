@@ -12,8 +12,7 @@ from typing import Any
 import numpy as np
 
 from app.core.decision.decide import Decision
-from app.core.decision.limits import nanometres
-from app.core.decision.step import Action
+from app.core.decision.limits import Zone, nanometres
 from app.core.early import acts_early
 from app.core.gain import LONGEST, Step, against, expected_scatter, opposed
 from app.loop.readings.schemas import ReadingIn
@@ -30,7 +29,7 @@ def part_of(sequence: int, decision: Decision, compensated: float) -> Part:
 
 def remember(stream: PendingStream, sequence: int, decision: Decision, compensated: float | None) -> None:
     """Keep a reading that tells of the effect of corrections. compensated: the sum of those its part was cut with, mm."""
-    if stream.tool is not None and compensated is not None and decision.action is not Action.STOP:
+    if stream.tool is not None and compensated is not None and decision.zone is not Zone.PROBE_FAULT:
         stream.parts.append(part_of(sequence, decision, compensated))
 
 
