@@ -134,7 +134,10 @@ def foreign_readings(
     values = {field: value for field, path in fields.items() if (value := member(content, path)) is not None}
     if "measured" in fields:
         path = fields["measured"]
-        sizes = [(str(values.get("characteristic", EVERY)), values.pop("measured", None), _unit_beside(content, path))]
+        if "measured" not in values:
+            words = f"The message has no value at {path!r}, where fields says that measured stands."
+            return [Found(None, values.get("key"), {}, words)]
+        sizes = [(str(values.get("characteristic", EVERY)), values.pop("measured"), _unit_beside(content, path))]
     else:
         sizes = [
             (name, size, _unit_beside(content, name))

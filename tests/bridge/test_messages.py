@@ -71,7 +71,7 @@ def test_members_that_characteristics_names_are_readings_each() -> None:
     [
         ({"v": 1.0}, {"measured": "v"}, "no key, no time and no part"),
         ({"v": "x", "p": 1}, {"measured": "v", "part": "p"}, 'measured = "x" is not a number'),
-        ({"p": 1}, {"measured": "v", "part": "p"}, "measured = null is empty"),
+        ({"v": {"d41": 1.0}, "p": 1}, {"measured": "v.d40", "part": "p"}, "no value at 'v.d40'"),
         ({"v": 1.0, "c": "d9", "p": 1}, {"measured": "v", "characteristic": "c", "part": "p"}, "'d9' is not named in"),
         ({"v": 1.0, "t": "2026-11-23 06:00"}, {"measured": "v", "measured_at": "t"}, "does not say in which time zone"),
         ({"p": 1}, {"part": "p"}, "none of the members that characteristics names"),
