@@ -190,7 +190,7 @@ class Folder(OneWay):
         return [words for words in (self._files_moved(), self._decision_written()) if words]
 
     def _decision_written(self) -> str:
-        """What keeps the file of decisions from being written."""
+        """The obstacle to writing the file of decisions, in words."""
         if self.settings.decisions is None:
             return ""
         place = Path(self.settings.decisions)
@@ -203,7 +203,7 @@ class Folder(OneWay):
         return ""
 
     def _files_moved(self) -> str:
-        """What keeps files from being made and moved."""
+        """The obstacle to making and moving files, in words."""
         probe = self.path / f".inband-check-{os.getpid()}.tmp"
         made = []
         try:
