@@ -124,7 +124,11 @@ async def _server(configuration: Configuration, machine: Machine) -> AsyncIterat
 
 
 async def _control(machine: Machine, *, alone: bool) -> AsyncIterator[Finding]:
-    link = link_of(machine)
+    link, once = link_of(machine), getattr(machine.settings, "read_once", False)
+    if once and not alone:
+        words = "a bridge runs with this store and reads here, so nothing was opened: its log says what comes"
+        yield Finding(machine.key, words, True)
+        return
     try:
         async with asyncio.timeout(machine.patience):
             identity = await link.connect()
@@ -141,7 +145,8 @@ async def _control(machine: Machine, *, alone: bool) -> AsyncIterator[Finding]:
             yield Finding(machine.key, by_date, False)
         async with asyncio.timeout(machine.patience):
             received = await link.fetch(Position())
-            yield Finding(machine.key, f"{len(received)} readings can be fetched now", True)
+            lost = ", and are gone: the check stores nothing. Have them printed again" if once and received else ""
+            yield Finding(machine.key, f"{len(received)} readings can be fetched now{lost}", not lost)
             if not by_date and (by_readings := wrong_date(link.clock)):
                 yield Finding(machine.key, by_readings, False)
             if faults := [each.fault for each in received if each.fault]:

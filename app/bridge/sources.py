@@ -44,6 +44,11 @@ class Settings(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
     flow: Literal["xon", "rts", "none"] = "xon"
     listen_on: str = "0.0.0.0"  # noqa: S104 - the control has to reach it
 
+    @property
+    def read_once(self) -> bool:
+        """A second reader would take lines from the first: everywhere but in a file."""
+        return bool(self.serial or self.connect or self.listen)
+
 
 class Reader(Protocol[L]):
     """A reader that finds lines in a stream of bytes. damaged: those that began and were not complete, or are wrong."""

@@ -4,7 +4,9 @@ import asyncio
 import os
 import socket
 import termios
+from collections.abc import Sequence
 from pathlib import Path
+from threading import Thread
 
 import pytest
 
@@ -12,6 +14,7 @@ from app.bridge import program
 from app.bridge.checking import check
 from app.bridge.configuration import configuration_from
 from app.bridge.kinds.dprnt import PrintedLink
+from app.bridge.links import Position, Received
 from app.bridge.store import Store
 from app.bridge.unit import ended
 from app.core.printed_line import Printed, line_of
@@ -136,6 +139,44 @@ def test_nothing_is_tried_out_beside_a_bridge_that_runs(tmp_path: Path) -> None:
         said = findings(tmp_path, table("folder", path=str(folder), format="csv"))
     store.close()
     assert "✓ lathe-1: a bridge runs with this store, so nothing was tried out that writes" in said
+
+
+def test_the_check_takes_no_line_from_a_bridge_that_runs(tmp_path: Path) -> None:
+    with (
+        socket.create_server(("127.0.0.1", 0)) as printing,
+        Store(tmp_path / "inband-bridge.sqlite3").alone(),
+    ):
+        machine = table("dprnt", connect=f"127.0.0.1:{printing.getsockname()[1]}")
+        said = findings(tmp_path, machine)
+        assert [each for each in said if each.startswith("✓ lathe-1: a bridge runs with this store and reads here")]
+        printing.setblocking(False)
+        with pytest.raises(BlockingIOError):
+            printing.accept()
+
+
+def test_lines_that_the_check_itself_has_taken_are_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    fetch = PrintedLink.fetch
+
+    async def arrived(link: PrintedLink, stored: Position) -> Sequence[Received]:
+        while True:
+            if found := await fetch(link, stored):
+                return found
+            await asyncio.sleep(0.01)
+
+    monkeypatch.setattr(PrintedLink, "fetch", arrived)
+    with socket.create_server(("127.0.0.1", 0)) as printing:
+
+        def prints() -> None:
+            there, _ = printing.accept()
+            with there:
+                there.sendall(f"{line_of(Printed(7, Unit.INCH, Slot(1, 1, 1.5, 0, 1, 3, 0, None)))}\r\n".encode())
+                there.recv(1)
+
+        thread = Thread(target=prints)
+        thread.start()
+        said = findings(tmp_path, table("dprnt", connect=f"127.0.0.1:{printing.getsockname()[1]}"))
+        thread.join()
+    assert [each for each in said if each.startswith("✗ lathe-1: 1 readings can be fetched now, and are gone")]
 
 
 def test_a_store_that_this_user_may_not_write_is_reported(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
