@@ -98,7 +98,7 @@ WITH_ROUTES = """
     loop.programs.api loop.tools.text_api loop.alarm_response.api
     views.alarm_load.api
     loop.reactions.api loop.quarantine.api loop.control_plan.api loop.present_context.api loop.notes.api
-    loop.notifications.api
+    loop.maintenance.api loop.notifications.api
     access.events_api access.api
     loop.machines.keys_api
     access.keys_api access.screens_api access.audit.api
@@ -114,6 +114,7 @@ WITH_ROUTES = """
     views.characteristic.six_pack
     views.alarm_load.pages
     loop.reactions.pages loop.alarm_response.pages loop.quarantine.pages loop.control_plan.pages loop.notes.pages
+    loop.maintenance.pages
     views.approvals.pages
     loop.tools.text_pages loop.tools.edge_pages loop.tools.pages loop.calibration.pages
     quality.gauge_studies.pages

@@ -6,7 +6,7 @@ where nobody of that can be reached now: failing, away, in quiet hours, or nobod
 
 from collections import defaultdict
 from collections.abc import Container, Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from datetime import date, datetime, time, timedelta, tzinfo
 from types import MappingProxyType
 from typing import NamedTuple
@@ -107,6 +107,30 @@ class Raised:
     def cause(self) -> tuple[str, str, str | None, int | None]:
         """The same for the same trouble, raised again."""
         return self.kind, self.machine, self.characteristic, self.tool
+
+
+@dataclass(frozen=True, slots=True)
+class Maintenance:
+    """A time in which notifications of a machine are withheld; None: of all machines. stopping_anyway: but for those of tone stop."""
+
+    machine: str | None
+    begins: datetime
+    ends: datetime
+    stopping_anyway: bool = True
+
+    def withholds(self, alarm: Raised) -> bool:
+        """Tell if it withholds notifications of this alarm while it runs."""
+        return self.machine in (None, alarm.machine) and not (self.stopping_anyway and alarm.tone == "stop")
+
+
+def after_maintenance(alarms: Iterable[Raised], windows: Sequence[Maintenance], now: datetime) -> list[Raised]:
+    """The alarms that nothing withholds now. Of one that was withheld the steps begin when the last maintenance has ended."""
+    found = []
+    for alarm in alarms:
+        begun = [each for each in windows if each.begins <= now and each.withholds(alarm)]
+        if not any(now < each.ends for each in begun):
+            found.append(replace(alarm, at=max(alarm.at, *(each.ends for each in begun))) if begun else alarm)
+    return found
 
 
 @dataclass(frozen=True, slots=True)

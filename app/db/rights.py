@@ -52,6 +52,7 @@ WITH_A_LIFE = frozenset(
         "correction",
         "machine",
         "machine_state",
+        "maintenance",
         "missed_measurement",
         "note",
         "paired_reading",

@@ -15,7 +15,7 @@ _BEHIND: tuple[tuple[str, str], ...] = (
     (r"/machines/[^/]+/(tools|averages|corrections)(/.*)?|/tools", "how-to/change-tools"),
     (r"/connections|/machines/[^/]+/connection", "how-to/connections"),
     (r"/machines/[^/]+/touch-tests/.*", "how-to/bridge"),
-    (r"/setup/notifications(/.*)?|/account/notifications", "how-to/notifications"),
+    (r"/setup/notifications(/.*)?|/account/notifications|/maintenance(/.*)?", "how-to/notifications"),
     (r"/(setup/characteristics|characteristics)/[^/]+/program|/setup/programs", "how-to/program-text"),
     (r"/setup/machines(/.*)?", "how-to/connect-a-machine"),
     (r"/setup/(characteristics|parameters)(/.*)?", "how-to/set-up-a-characteristic"),

@@ -56,7 +56,7 @@ TAGS = {
     "forms": "Form and position of features from their touches: deviation, verdict, uncertainty, touches that do not belong.",
     "programs": "Program text of the controls: read, written, and fetched where a machine has no network.",
     "alarms": "What needs a person, and what that person did about it.",
-    "notifications": "Who is notified of which alarm: routes, receivers, and each delivery with what was answered.",
+    "notifications": "Who is notified of which alarm: routes, receivers, maintenance, and each delivery with what was answered.",
     "connections": "Bridges beside the machines: their heartbeats, how each machine is connected, and what waits there.",
     "notes": "What people wrote down at a machine or a characteristic, at a moment; shown on every chart there.",
     "machines": "The machines that push readings.",

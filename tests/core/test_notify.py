@@ -8,7 +8,21 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from app.core.notify import GAP, Group, Hours, Notice, Raised, Receiver, Record, Route, Step, Turn, notices
+from app.core.notify import (
+    GAP,
+    Group,
+    Hours,
+    Maintenance,
+    Notice,
+    Raised,
+    Receiver,
+    Record,
+    Route,
+    Step,
+    Turn,
+    after_maintenance,
+    notices,
+)
 from tests.chance import examples
 
 NOON = datetime(2026, 11, 26, 12, tzinfo=UTC)  # a Thursday
@@ -94,6 +108,47 @@ class TestHours:
         assert to(due([route()], NOON + HOUR, quiet=quiet)) == [1]
         assert to(due([route(urgent=True)], NOON, quiet=quiet)) == [1]
         assert due([route(urgent=True)], NOON, away_until=NOON + HOUR) == []
+
+
+class TestMaintenance:
+    """From noon to one; the alarm comes ten minutes after noon."""
+
+    AT = NOON + 10 * MINUTE
+
+    def left(self, now: datetime, *windows: Maintenance, tone: str = "wear") -> list[Raised]:
+        return after_maintenance([Raised(1, "x", tone, "lathe", None, None, self.AT)], windows, now)
+
+    @pytest.mark.parametrize(
+        ("machine", "minutes", "tone", "anyway", "withheld"),
+        [
+            ("lathe", 10, "wear", True, True),
+            (None, 10, "wear", True, True),
+            ("mill", 10, "wear", True, False),
+            ("lathe", 10, "stop", True, False),
+            ("lathe", 10, "stop", False, True),
+            ("lathe", 59.9, "wear", True, True),
+            ("lathe", 60, "wear", True, False),
+        ],
+    )
+    def test_it_withholds(self, machine: str | None, minutes: float, tone: str, anyway: bool, withheld: bool) -> None:
+        window = Maintenance(machine, NOON, NOON + HOUR, anyway)
+        assert (self.left(NOON + minutes * MINUTE, window, tone=tone) == []) is withheld
+
+    def test_what_is_planned_withholds_nothing_yet(self) -> None:
+        window = Maintenance("lathe", NOON + HOUR, NOON + 2 * HOUR)
+        assert [each.at for each in self.left(NOON + 59 * MINUTE, window)] == [self.AT]
+
+    def test_its_steps_begin_when_it_has_ended(self) -> None:
+        windows = [Maintenance("lathe", NOON, NOON + HOUR), Maintenance(None, NOON + HOUR, NOON + 2 * HOUR)]
+        assert self.left(NOON + HOUR, *windows) == []
+        steps = [route((0, 1), (10, 2))]
+        assert to(due(steps, NOON + 2 * HOUR, self.left(NOON + 2 * HOUR, *windows))) == [1], "nobody is passed over"
+        later = NOON + 2 * HOUR + 10 * MINUTE
+        assert to(due(steps, later, self.left(later, *windows), Record({(1, 1): NOON + 2 * HOUR}))) == [2]
+
+    def test_what_is_over_before_the_alarm_delays_nothing(self) -> None:
+        window = Maintenance("lathe", NOON - HOUR, NOON)
+        assert [each.at for each in self.left(self.AT, window)] == [self.AT]
 
 
 class TestWhom:

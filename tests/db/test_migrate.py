@@ -80,6 +80,7 @@ ADDED_TABLES = {
     "notification_route",
     "receiver_group",
     "plant_calendar",
+    "maintenance",
     "announced",
     "delivery",
     "quarantine",

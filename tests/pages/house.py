@@ -187,6 +187,9 @@ PAGES = {
     "/kinematics": ["/kinematics"],
     "/kinematics/measuring-plan": ["/kinematics/measuring-plan"],
     "/setup/jobs": ["/setup/jobs"],
+    "/maintenance": ["/maintenance", "/maintenance?machine={machine}"],
+    "/maintenance/new": ["/maintenance/new?machine={machine}"],
+    "/maintenance/{number}/end": ["/maintenance/{maintenance}/end"],
     "/setup/notifications": ["/setup/notifications"],
     "/setup/notifications/days-off": ["/setup/notifications/days-off"],
     "/setup/notifications/groups/new": ["/setup/notifications/groups/new"],
@@ -413,6 +416,9 @@ def _notified(made: Shop) -> None:
     number = made.call("POST", "/notifications/receivers", 201, **receiver)["id"]
     turn = {"receivers": [number], "shift": "06:00", "days": [1, 2, 3, 4, 5]}
     made.call("POST", "/notifications/groups", 201, name="Setters of the hall", members=[number], rota=[turn])
+    made.call(
+        "POST", "/maintenance", 201, machine=made.machine, reason="Spindle bearing replaced; the supplier is here"
+    )
     made.call("PUT", "/notifications/calendar", country="DE", subdivision="BY", days=["2026-12-24"])
     hours = [{"days": [1, 2, 3, 4, 5], "begins": "06:00", "ends": "14:00"}]
     steps = [{"receivers": [number]}, {"after": 15, "receivers": [number]}]
@@ -454,5 +460,6 @@ def values_of(shop: Shop) -> dict[str, Any]:
         ].partition("#")[2],
         "route": shop.call("GET", "/notifications/routes")["items"][-1]["id"],
         "group": shop.call("GET", "/notifications/groups")["items"][-1]["id"],
+        "maintenance": shop.call("GET", "/maintenance")["items"][0]["id"],
         "plan": shop.call("GET", "/reactions/plans")["items"][-1]["id"],
     }

@@ -71,6 +71,8 @@ KNOWN = (
     ("/signals/{number}", _numbered("signal", "number")),
     ("/notes/{note}", _numbered("note", "note")),
     ("/notes/{number}", _numbered("note", "number")),
+    ("/maintenance/{maintenance}", _numbered("maintenance", "maintenance")),
+    ("/maintenance/{number}", _numbered("maintenance", "number")),
     ("/plans/{plan}", "SELECT DISTINCT id AS plan FROM reaction_plan ORDER BY 1"),
     ("/setup/reactions/{plan}", "SELECT DISTINCT id AS plan FROM reaction_plan ORDER BY 1"),
     ("/catalogue/{entry}", _numbered("catalogue_entry", "entry")),

@@ -10,6 +10,7 @@ import json
 import re
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
+from datetime import UTC, datetime, timedelta
 from functools import cache, partial
 from typing import Any, NamedTuple
 
@@ -114,6 +115,14 @@ BODIES: dict[str, dict[str, Any]] = {
     "POST /api/v1/notifications/groups": GROUP,
     "PUT /api/v1/notifications/groups/{group}": GROUP,
     "PUT /api/v1/notifications/calendar": {"country": "DE", "subdivision": "BY", "days": ["2026-12-24"]},
+    "POST /api/v1/maintenance": {
+        "machine": "{machine}",
+        "begins": f"{datetime.now(UTC) + timedelta(days=1):%Y-%m-%dT%H:%M:%SZ}",
+        "ends": f"{datetime.now(UTC) + timedelta(days=1, hours=1):%Y-%m-%dT%H:%M:%SZ}",
+        "reason": "Spindle bearing replaced",
+        "stopping_anyway": False,
+    },
+    "POST /api/v1/maintenance/{maintenance}/end": WHY,
     "POST /api/v1/notifications/receivers": RECEIVER | {"means": "webhook"},
     "PATCH /api/v1/notifications/receivers/{receiver}": RECEIVER | {"address": "anna@example.com", "events": []},
     "PUT /api/v1/notifications/me": {
@@ -599,6 +608,7 @@ class Place:
             "receiver": self.notified(shop),
             "route": 1,
             "group": 1,
+            "maintenance": shop.call("POST", "/maintenance", 201, machine=shop.machine, reason="New bearing")["id"],
             "plan": shop.call("POST", "/reactions/plans", 201, **self.reaction(shop))["id"],
             "entry": shop.call("POST", "/reactions/catalogue", 201, sort="action", name=shop.machine)["id"],
             "picture": shop.admin.post("/api/v1/reactions/pictures", json=example_of("PictureIn")).json()["digest"],

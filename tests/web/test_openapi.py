@@ -417,6 +417,8 @@ FORMS: dict[str, tuple[str, ...] | None] = {
     "/setup/reactions/catalogue": ("add_catalogue_entry",),
     "/setup/reactions/catalogue/{entry}": ("change_catalogue_entry",),
     "/notes/new": ("write_note",),
+    "/maintenance/new": ("enter_maintenance",),
+    "/maintenance/{number}/end": ("end_maintenance",),
     "/notes/{number}/withdraw": ("withdraw_note",),
     "/proposals/{number}": ("approve_proposal", "reject_proposal", "withdraw_proposal"),
     "/reports": ("ask_for_reports",),

@@ -1,6 +1,7 @@
 """Pages: the operator's board, one alarm, the history. Everything works as plain links and posts; scripts only save a page load."""
 
 from collections.abc import Mapping
+from datetime import UTC, datetime
 from functools import partial
 from typing import Annotated
 
@@ -15,6 +16,7 @@ from app.loop.alarm_response.outcomes import outcomes
 from app.loop.alarm_response.queries import AlarmRow
 from app.loop.alarm_response.reaction_queries import Reactions
 from app.loop.machines import queries as machines
+from app.loop.maintenance.queries import running
 from app.web.deps import FormDep, Number, SessionDep, Sought, Word
 from app.web.fields import Reason
 from app.web.forms import by_field
@@ -50,6 +52,7 @@ def board(
         last=queries.acknowledged_last(session, machine_id=machine_id),
         machines=machines.machines(session),
         by_machine=by_machine,
+        maintenance=running(session, datetime.now(UTC), machine_id),
         machine=machine_row,
         done=queries.alarm(session, done) if done else None,
         late=queries.alarm(session, late) if late else None,

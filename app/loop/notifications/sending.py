@@ -24,6 +24,7 @@ from app.language.times import end_of_shift, plant_zone
 from app.loop.alarm_response.queries import AlarmRow, alarm
 from app.loop.alarm_response.reaction_queries import Reactions, plans_in_force, trouble_of
 from app.loop.alarms.kinds import kind_named
+from app.loop.maintenance.queries import withheld_since
 from app.loop.notifications import message, queries
 from app.loop.notifications.calendar_queries import days_off as days_off_of
 from app.loop.notifications.group_schemas import group_of
@@ -171,7 +172,9 @@ def _about_alarms(
 ) -> list[Job]:
     stored = session.scalars(select(NotificationRoute.rule).where(NotificationRoute.enabled)).all()
     planned = [plan for plan in plans_in_force(session) if plan.receivers]
-    active = _active(session) if stored or planned else []
+    raised = _active(session) if stored or planned else []
+    windows = withheld_since(session, (each.at for each in raised))
+    active = notify.after_maintenance(raised, windows, now)
     if not active:
         return []
     same = _same_address(rows)

@@ -9,6 +9,7 @@ from sqlalchemy.orm import Session
 from app.access.deps import require
 from app.core.state import CharacteristicState
 from app.loop.machines import queries as machines
+from app.loop.maintenance.queries import running
 from app.loop.notes import queries as notes
 from app.loop.notes.queries import NEWEST
 from app.quality.wear.queries import next_event
@@ -72,6 +73,7 @@ def _page(request: Request, session: Session, show: str, machine: str | None, do
         groups=[_view(group, show, MOST_OF_A_MACHINE if machine else MOST // max(1, len(groups))) for group in groups],
         machine=groups[0].machine if machine else None,
         notes=notes.notes(session, machine_id=groups[0].machine.id, limit=NEWEST) if machine else [],
+        maintenance=running(session, now, groups[0].machine.id) if machine else [],
         connections=connections_of(session, groups[0].machine) if machine else [],
         machines=machines.machines(session) if machine else [],
         show=show,

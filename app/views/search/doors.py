@@ -28,6 +28,7 @@ def doors() -> list[Door]:
             _("ISA-18.2, IEC 62682, alarm flood, chattering, stale, nuisance alarms, top ten"),
         ),
         Door(_("Causes of alarms"), "/alarms/causes", _("Pareto, time to acknowledge, time to recover")),
+        Door(_("Maintenance"), "/maintenance", _("silence, downtime, service, nobody is notified, mute, planned")),
         Door(_("Quarantines"), "/quarantines", _("parts set aside, affected parts, release, scrap, containment")),
         Door(_("Approvals"), "/corrections", _("corrections that wait, approve, held")),
         Door(_("Proposals"), "/proposals", _("proposed parameters, what-if")),

@@ -185,6 +185,35 @@ class TestMail:
         assert "Notifications arrive here." in mails[0].to(address)[0]
 
 
+class TestMaintenance:
+    def test_nobody_is_notified_before_it_ends(self, shop: Shop, mails: tuple[Mails, str]) -> None:
+        address = f"{unique('una')}@example.com"
+        una = receiver(shop, address, "mail")
+        route(shop, (0, una))
+        made = shop.call("POST", "/maintenance", 201, machine=shop.machine, reason="New bearing")
+        shop.read(350)  # worn: it does not stop
+        other = Shop(shop.server)
+        witness = receiver(other, f"{unique('witness')}@example.com", "mail")
+        route(other, (0, witness), machines=[shop.machine, other.machine])
+        other.read(350)
+        until(lambda: deliveries(other, witness, "delivered"))
+        assert [each["alarms"] for each in deliveries(other, witness)] == [
+            [shop.call("GET", f"/alarms?machine={other.machine}")["items"][0]["id"]]
+        ], "the other machine's alone"
+        assert mails[0].to(address) == []
+        shop.call("POST", f"/maintenance/{made['id']}/end")
+        assert until(lambda: mails[0].to(address))[0].startswith("Tool worn")
+
+    def test_an_alarm_that_stops_goes_all_the_same(self, shop: Shop, mails: tuple[Mails, str]) -> None:
+        address = f"{unique('uwe')}@example.com"
+        route(shop, (0, receiver(shop, address, "mail")))
+        shop.call("POST", "/maintenance", 201, machine=shop.machine, reason="New bearing")
+        flood(shop, 1)
+        shop.read(15_000)  # a probe fault
+        (mail,) = until(lambda: mails[0].to(address))
+        assert mail.startswith("Probe fault"), "and the one that does not stop is not in it"
+
+
 class TestWebhook:
     def test_it_is_signed(self, shop: Shop, hooks: Hooks) -> None:
         path = f"/{unique('hook')}"

@@ -1,0 +1,1 @@
+"""Maintenance: times in which people are not notified of the alarms of a machine, or of any. The alarms are raised as ever."""

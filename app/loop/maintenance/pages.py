@@ -1,0 +1,123 @@
+"""Pages: maintenance that runs, is planned or over; the form that enters it, and the question that ends it."""
+
+from collections.abc import Mapping
+from datetime import UTC, datetime
+from functools import partial
+from typing import Any
+
+from fastapi import APIRouter, Request, Response
+from sqlalchemy.orm import Session
+from starlette.responses import RedirectResponse
+
+from app.access.deps import Caller, Operator, Viewer
+from app.errors import Conflict, InbandError, Invalid, NotAllowed
+from app.language.i18n import _
+from app.loop.machines import queries as machines
+from app.loop.maintenance import actions, queries, verbs
+from app.loop.maintenance.form_reader import as_typed
+from app.loop.maintenance.verbs import END, OfMaintenance
+from app.web.deps import Before, FormDep, Number, SessionDep, Word
+from app.web.forms import by_field
+from app.web.paging import address, part_of
+from app.web.templates import page
+from app.web.verb import Outcome, Verb, draw_question, said
+
+router = APIRouter(include_in_schema=False)
+ON_PAGE = 50
+
+
+@router.get("/maintenance")
+def maintenance_page(
+    request: Request,
+    session: SessionDep,
+    _caller: Viewer,
+    machine: Word = None,
+    before: Before = None,
+    done: Word = None,
+    n: Number = None,
+) -> Response:
+    """Maintenance of a machine or of all, the last entered first. done: what was done to maintenance n."""
+    chosen = machines.machine_named(session, machine) if machine else None
+    rows = queries.all_maintenance(session, machine_id=chosen.id if chosen else None, before=before, limit=ON_PAGE + 1)
+    return page(
+        request,
+        "maintenance/list.html",
+        part=part_of(
+            rows, ON_PAGE, before, lambda row: row.maintenance.id, partial(address, "/maintenance", machine=machine)
+        ),
+        machine=chosen,
+        machines=machines.machines(session),
+        now=datetime.now(UTC),
+        done=said(
+            (END,),
+            done,
+            n,
+            {"entered": _("Maintenance {n} is entered."), "late": _("Maintenance {n} is over already.")},
+        )
+        if done
+        else None,
+        address=address,
+    )
+
+
+@router.get("/maintenance/new")
+def new_maintenance(request: Request, session: SessionDep, caller: Operator, machine: Word = None) -> Response:
+    return _form(request, session, caller, {"machine": machine or "", "stopping_anyway": "true"})
+
+
+def _form(
+    request: Request, session: Session, caller: Caller, form: Mapping[str, str], error: InbandError | None = None
+) -> Response:
+    known = [(each.key, each.name) for each in machines.machines(session)]
+    return page(
+        request,
+        "maintenance/new.html",
+        status=error.status if error else 200,
+        form=form,
+        errors=by_field(error) if error else {},
+        problem=error if error and not error.errors else None,
+        choices=[("", _("All machines")), *known] if caller.may("engineer") else known,
+        usual=actions.USUAL,
+        longest=actions.OF_OPERATOR,
+    )
+
+
+@router.post("/maintenance/new")
+def enter(request: Request, session: SessionDep, caller: Operator, form: FormDep) -> Response:
+    """Enter it; times are by the plant's clock."""
+    try:
+        row = actions.enter_maintenance(session, as_typed(form), caller)
+    except (Invalid, Conflict, NotAllowed) as error:
+        return _form(request, session, caller, form, error)
+    machine = row.machine.key if row.machine else None
+    return RedirectResponse(address("/maintenance", machine=machine, done="entered", n=row.maintenance.id), 303)
+
+
+def _of_number(session: SessionDep, caller: Operator, number: int) -> OfMaintenance:
+    return OfMaintenance(session, number, caller)
+
+
+def _around(on: OfMaintenance, _verb: Verb[OfMaintenance, Any]) -> dict[str, Any]:
+    row = on.row
+    return {
+        "machine": row.machine or {"name": row.name},
+        "trail": [(_("Maintenance"), "/maintenance")],
+        "back": "/maintenance",
+    }
+
+
+def _ended(_request: Request, on: OfMaintenance, _verb: Verb[OfMaintenance, Any], outcome: Outcome) -> Response:
+    """Sent twice, or after somebody else, it changes nothing and says so."""
+    done = "late" if outcome.kind == "late" else verbs.END.name
+    return RedirectResponse(address("/maintenance", done=done, n=on.number), 303)
+
+
+draw_question(
+    router,
+    "/maintenance/{number}/end",
+    (END,),
+    _of_number,
+    around=_around,
+    after=_ended,
+    astray=lambda: _("Go back to the list of maintenance."),
+)

@@ -1,0 +1,173 @@
+"""Maintenance: who may enter it, which times are refused, and how it ends."""
+
+from datetime import UTC, datetime, timedelta
+from typing import Any
+from zoneinfo import ZoneInfo
+
+import pytest
+
+from app.errors import Invalid
+from app.language.times import in_zone
+from app.loop.maintenance.form_reader import as_typed
+from tests.conftest import Server
+from tests.shop import Person, Shop
+
+WHY = {"reason": "Bearing replaced"}
+
+
+def ahead(hours: float) -> str:
+    return (datetime.now(UTC) + timedelta(hours=hours)).isoformat()
+
+
+def enter(shop: Shop, status: int = 201, **more: Any) -> Any:
+    return shop.call("POST", "/maintenance", status, **{"machine": shop.machine} | WHY | more)
+
+
+def listed(shop: Shop, **more: Any) -> list[Any]:
+    return list(shop.call("GET", f"/maintenance?machine={shop.machine}" + ("&ahead=true" if more else ""))["items"])
+
+
+class TestEntering:
+    def test_it_begins_now_and_ends_after_a_shift(self, shop: Shop) -> None:
+        made = enter(shop)
+        begins, ends = (datetime.fromisoformat(made[each]) for each in ("begins", "ends"))
+        assert abs(begins - datetime.now(UTC)) < timedelta(minutes=1)
+        assert ends - begins == timedelta(hours=8)
+        assert (made["state"], made["stopping_anyway"], made["machine"]) == ("running", True, shop.machine)
+
+    def test_it_is_planned(self, shop: Shop) -> None:
+        made = enter(shop, begins=ahead(24), ends=ahead(30), stopping_anyway=False)
+        assert (made["state"], made["stopping_anyway"]) == ("planned", False)
+
+    @pytest.mark.parametrize(
+        ("times", "field", "words"),
+        [
+            ({"begins": -1, "ends": 1}, "begins", "lies in the past"),
+            ({"ends": -1}, "ends", "must come after"),
+            ({"begins": 5, "ends": 4}, "ends", "must come after"),
+            ({"begins": 5, "ends": 5 + 63 * 24}, "ends", "within 62 days"),
+            ({"begins": 367 * 24}, "begins", "more than a year ahead"),
+        ],
+    )
+    def test_times_that_cannot_be_are_refused(
+        self, shop: Shop, times: dict[str, float], field: str, words: str
+    ) -> None:
+        refused = enter(shop, 422, **{name: ahead(hours) for name, hours in times.items()})
+        (error,) = refused["errors"]
+        assert error["field"] == field
+        assert words in error["message"]
+        assert listed(shop) == []
+
+    def test_it_overlaps_with_none_of_the_same_machine(self, shop: Shop) -> None:
+        first = enter(shop, ends=ahead(2))
+        refused = enter(shop, 409, begins=ahead(1), ends=ahead(3))
+        assert f"maintenance {first['id']} from" in refused["detail"]
+        enter(shop, begins=first["ends"], ends=ahead(3))  # one ends where the next begins
+        assert len(listed(shop)) == 2
+
+    def test_after_one_is_ended_the_next_may_be_entered(self, shop: Shop) -> None:
+        first = enter(shop)
+        shop.call("POST", f"/maintenance/{first['id']}/end")
+        enter(shop)
+        assert [each["state"] for each in listed(shop)] == ["running", "over"]
+        assert [each["state"] for each in listed(shop, ahead=True)] == ["running"]
+
+
+class TestRoles:
+    def test_an_operator_puts_one_machine_under_maintenance_for_a_day(self, shop: Shop, server: Server) -> None:
+        operator = server.client(server.key("operator"))
+
+        def sent(status: int, **more: Any) -> Any:
+            return shop.call("POST", "/maintenance", status, client=operator, **{"machine": shop.machine} | WHY | more)
+
+        for beyond in ({"machine": None}, {"ends": ahead(25)}, {"stopping_anyway": False}, {"begins": ahead(20)}):
+            assert "takes the role engineer" in sent(403, **beyond)["what_to_do"]
+        made = sent(201, ends=ahead(23))
+        assert shop.call("POST", f"/maintenance/{made['id']}/end", client=operator)["state"] == "over"
+
+    def test_who_may_only_look_enters_and_ends_nothing(self, shop: Shop, server: Server) -> None:
+        made, viewer = enter(shop), server.client(server.key("viewer"))
+        shop.call("POST", "/maintenance", 403, client=viewer, machine=shop.machine, **WHY)
+        shop.call("POST", f"/maintenance/{made['id']}/end", 403, client=viewer)
+        assert shop.call("GET", f"/maintenance/{made['id']}", client=viewer)["state"] == "running"
+
+    def test_the_key_of_a_machine_sees_its_own(self, shop: Shop) -> None:
+        made = enter(shop)
+        seen = shop.call("GET", "/maintenance", client=shop.machine_client)["items"]
+        assert [each["id"] for each in seen if each["machine"]] == [made["id"]]
+        enter(shop, 403, client=shop.machine_client)
+
+
+class TestEnding:
+    def test_it_is_on_record_who_ended_it(self, shop: Shop) -> None:
+        made = enter(shop)
+        ended = shop.call("POST", f"/maintenance/{made['id']}/end")
+        assert (ended["state"], bool(ended["ended_by"])) == ("over", True)
+        again = shop.call("POST", f"/maintenance/{made['id']}/end", 409)
+        assert f"Maintenance {made['id']} ended at" in again["detail"]
+        audit = shop.call("GET", f"/audit?subject=maintenance/{made['id']}")["items"]
+        assert [each["action"] for each in audit] == ["maintenance ended", "maintenance entered"]
+
+    def test_what_is_planned_is_cancelled(self, shop: Shop) -> None:
+        made = enter(shop, begins=ahead(5), ends=ahead(6))
+        assert shop.call("POST", f"/maintenance/{made['id']}/end")["state"] == "cancelled"
+        enter(shop, begins=ahead(5), ends=ahead(6))  # its time is free again
+
+
+class TestClock:
+    """The night of the summer time is an hour shorter, that of the winter time an hour longer."""
+
+    def typed(self, begins: str, ends: str) -> tuple[datetime | None, datetime | None]:
+        with in_zone(ZoneInfo("Europe/Belgrade")):
+            read = as_typed({"reason": "Oil", "begins": begins, "ends": ends})
+        return read.begins, read.ends
+
+    def test_a_time_that_the_clock_skips_is_refused(self) -> None:
+        with pytest.raises(Invalid) as refused:
+            self.typed("2027-03-28T02:30", "2027-03-28T06:00")
+        assert refused.value.errors[0].message.endswith("the clocks go forward in that hour")
+
+    def test_one_that_is_there_twice_holds_both_hours(self) -> None:
+        begins, ends = self.typed("2027-10-31T02:15", "2027-10-31T02:45")
+        assert begins is not None
+        assert ends is not None
+        assert ends - begins == timedelta(hours=1, minutes=30)
+
+
+class TestPages:
+    def test_it_is_entered_seen_and_ended(self, shop: Shop, server: Server) -> None:
+        person = Person(server, "operator")
+        shown = person.send("/maintenance/new", machine=shop.machine, reason="New way covers", stopping_anyway="true")
+        assert "New way covers" in shown
+        (made,) = listed(shop)
+        for path in (f"/machines/{shop.machine}", f"/alarms?machine={shop.machine}"):
+            assert "under maintenance until" in person.open(path)
+        assert "is ended. People are notified again." in person.send(f"/maintenance/{made['id']}/end")
+        assert "is ended." in person.send(f"/maintenance/{made['id']}/end"), "sent twice"
+        assert "under maintenance until" not in person.open(f"/machines/{shop.machine}")
+
+    @pytest.mark.parametrize(
+        ("begins", "ends", "words"),
+        [
+            ("", "never", "Is not a time"),
+            ("2020-01-01T06:00", "", "Lies in the past"),
+        ],
+    )
+    def test_what_is_refused_stands_at_its_field(
+        self, shop: Shop, server: Server, begins: str, ends: str, words: str
+    ) -> None:
+        person = Person(server, "engineer")
+        shown = person.send("/maintenance/new", 422, machine=shop.machine, reason="Oil", begins=begins, ends=ends)
+        assert words in shown
+        assert 'value="Oil"' in shown
+        assert listed(shop) == []
+
+    def test_an_operator_who_asks_for_more_sees_who_may(self, shop: Shop, server: Server) -> None:
+        person = Person(server, "operator")
+        shown = person.send("/maintenance/new", 403, machine=shop.machine, reason="Oil", ends=ahead(30)[:16])
+        assert "takes the role engineer" in shown
+
+    def test_its_ticks_count(self, shop: Shop, server: Server) -> None:
+        Person(server, "engineer").send("/maintenance/new", machine=shop.machine, reason="Oil")
+        (made,) = listed(shop)
+        assert made["stopping_anyway"] is False, "the tick was taken away"
