@@ -1,7 +1,8 @@
 """Notifications of active alarms, to whom and when: routes, quiet hours, repetition, escalation, one message in place of a flood.
 
 A route names the alarms it is for and steps of receivers. A step begins some minutes after the alarm, or with the step before
-where nobody of that can be reached now: failing, away, in quiet hours, or nobody on duty. A receiver gets at most one message in `GAP`, with everything that is due then.
+where nobody of that can be reached now: failing, away, in quiet hours, or nobody on duty. A receiver gets at most one message in `GAP`, with everything that is due then;
+an alarm that stops a machine does not wait for it where the message before had none, so in `GAP` there are two at most.
 """
 
 from collections import defaultdict
@@ -178,7 +179,8 @@ class Route:
 class Receiver:
     """Somebody, or something, that is notified. quiet: when not; away_until: not before; last_at: its last message.
 
-    failing: it could not be reached the last time. busy: it must not be tried now, for it is being tried or pauses.
+    failing: it could not be reached the last time. busy: it must not be tried now, for it is being tried or pauses. spare: its
+    last message is known to have had no alarm that stops a machine.
     """
 
     id: int
@@ -187,6 +189,12 @@ class Receiver:
     last_at: datetime | None = None
     failing: bool = False
     busy: bool = False
+    spare: bool = False
+
+    def may_have_one(self, now: datetime, *, stops: bool) -> bool:
+        """Tell if it may be sent a message now. stops: with an alarm in it that stops a machine, and is news to it."""
+        waited = self.last_at is None or self.last_at + GAP <= now
+        return not self.busy and (waited or (stops and self.spare))
 
     def listens(self, now: datetime, local: datetime, *, urgent: bool) -> bool:
         """Tell if it takes a message now."""
@@ -239,11 +247,14 @@ def notices(
                 if at is not None and at <= now and receiver.listens(now, local, urgent=route.urgent):
                     leaves = (alarm.id, number) in record.alarms or at + route.digest <= now
                     due[number][alarm.id] = due[number].get(alarm.id, False) or leaves
-    return [
-        Notice(number, tuple(sorted(of)), frozenset(each for each in of if (each, number) in record.alarms))
-        for number, of in sorted(due.items())
-        if any(of.values()) and _may_have_one(receivers[number], now)
-    ]
+    stopping = {alarm.id for alarm in alarms if alarm.tone == "stop"}
+    found = []
+    for number, of in sorted(due.items()):
+        again = frozenset(each for each in of if (each, number) in record.alarms)
+        stops = any(leaves and each in stopping and each not in again for each, leaves in of.items())
+        if any(of.values()) and receivers[number].may_have_one(now, stops=stops):
+            found.append(Notice(number, tuple(sorted(of)), again))
+    return found
 
 
 def _begun(
@@ -281,10 +292,6 @@ def _due_at(route: Route, receiver: Receiver, alarm: Raised, begun: datetime, re
         return last + route.repeat if route.repeat else None
     before = record.causes.get((alarm.cause, receiver.id))
     return begun if before is None else max(begun, before + route.hold_off)
-
-
-def _may_have_one(receiver: Receiver, now: datetime) -> bool:
-    return not receiver.busy and (receiver.last_at is None or receiver.last_at + GAP <= now)
 
 
 def pause_after(failures: int) -> timedelta:

@@ -151,6 +151,34 @@ class TestMaintenance:
         assert [each.at for each in self.left(self.AT, window)] == [self.AT]
 
 
+class TestMinute:
+    """One message in a minute, and one more where an alarm stops a machine."""
+
+    STOP, WEAR = (Raised(number, "x", tone, "lathe", None, number, NOON) for number, tone in ((1, "stop"), (2, "wear")))
+
+    @pytest.mark.parametrize(
+        ("alarms", "spare", "seconds", "sent"),
+        [
+            ([WEAR], True, 59, False),
+            ([WEAR], True, 60, True),
+            ([STOP], True, 1, True),
+            ([STOP], False, 59, False),
+            ([WEAR, STOP], True, 1, True),
+        ],
+    )
+    def test_what_stops_does_not_wait_where_the_message_before_had_none(
+        self, alarms: list[Raised], spare: bool, seconds: int, sent: bool
+    ) -> None:
+        now = NOON + timedelta(seconds=seconds)
+        found = due([route()], now, alarms, last_at=NOON, spare=spare)
+        assert [notice.alarms for notice in found] == [tuple(sorted(each.id for each in alarms))] * sent
+
+    def test_neither_a_reminder_nor_one_that_is_being_tried_goes_before_its_minute(self) -> None:
+        record = Record({(1, 1): NOON - HOUR})
+        assert due([route(repeat=MINUTE)], NOON, [self.STOP], record, last_at=NOON - MINUTE / 2, spare=True) == []
+        assert due([route()], NOON, [self.STOP], last_at=NOON - MINUTE / 2, spare=True, busy=True) == []
+
+
 class TestWhom:
     def test_only_the_alarms_that_a_route_names(self) -> None:
         for name, mine, other in (

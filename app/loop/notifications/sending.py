@@ -178,14 +178,17 @@ def _about_alarms(
     if not active:
         return []
     same = _same_address(rows)
+    last = {number: max(filter(None, (rows[each].last_at for each in same[number])), default=None) for number in rows}
+    calm = {each for number in _calm(session, now) if rows[number].last_at == last[number] for each in same[number]}
     receivers = {
         number: notify.Receiver(
             number,
             week(map(HoursIn.model_validate, row.quiet)),
             row.away_until,
-            max((at for each in same[number] if (at := rows[each].last_at) is not None), default=None),
+            last[number],
             failing=row.failures > 0,
             busy=not same[number] <= free,
+            spare=number in calm,
         )
         for number, row in rows.items()
     }
@@ -212,6 +215,18 @@ def _same_address(rows: Mapping[int, Receiver]) -> dict[int, set[int]]:
     for number, row in rows.items():
         led[row.means, row.address.casefold() if row.means == "mail" else row.address].add(number)
     return {number: numbers for numbers in led.values() for number in numbers}
+
+
+def _calm(session: Session, now: datetime) -> set[int]:
+    """Receivers whose last message of this minute is on record, and had no alarm that stops a machine."""
+    of_last = (Announced.receiver_id == Receiver.id) & (Announced.at == Receiver.last_at)
+    last = select(Receiver.id, Alarm.kind).join(Announced, of_last).join(Alarm, Alarm.id == Announced.alarm_id)
+    tones = defaultdict[int, set[str]](set)
+    for number, kind in session.execute(
+        last.where(Receiver.last_at > now - notify.GAP, Receiver.deleted_at.is_(None)).distinct()
+    ):
+        tones[number].add(kind_named(kind).tone)
+    return {number for number, of in tones.items() if "stop" not in of}
 
 
 def _of_plans(session: Session) -> list[Route]:

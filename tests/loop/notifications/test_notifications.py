@@ -96,15 +96,15 @@ def later(shop: Shop, to: Any, minutes: float = 1) -> None:
         session.execute(text("UPDATE announced SET at = at - :by WHERE receiver_id = :id"), by)
 
 
-def flood(shop: Shop, number: int) -> None:
+def flood(shop: Shop, number: int, kind: str = "hunting") -> None:
     """So many alarms at once, each about another tool."""
     with shop.server.database.begin() as session:
         session.execute(
             text(
                 "INSERT INTO alarm (machine_id, tool_memory, kind)"
-                " SELECT id, n, 'hunting' FROM machine, generate_series(1, :number) n WHERE key = :key"
+                " SELECT id, n, :kind FROM machine, generate_series(1, :number) n WHERE key = :key"
             ),
-            {"number": number, "key": shop.machine},
+            {"number": number, "key": shop.machine, "kind": kind},
         )
 
 
@@ -175,6 +175,24 @@ class TestMail:
         shop.read(350)
         later(shop, cleo)
         assert until(lambda: mails[0].to(address)[1:])[0].startswith("Tool worn")
+
+    def test_what_stops_a_machine_waits_for_no_minute_once(self, shop: Shop, mails: tuple[Mails, str]) -> None:
+        address = f"{unique('gil')}@example.com"
+        gil = receiver(shop, address, "mail")
+        route(shop, (0, gil))
+        flood(shop, 1)  # which stops nothing
+        until(lambda: deliveries(shop, gil, "delivered"))
+        flood(shop, 1, "early_effect")
+        subjects = [mail.partition("\n")[0] for mail in until(lambda: mails[0].to(address)[1:])]
+        assert subjects == [f"Early effect: Lathe {shop.machine[6:]}, tool 1"]
+        until(lambda: len(deliveries(shop, gil, "delivered")) == 2)
+        flood(shop, 1, "opposite_effect")
+        witness = receiver(shop, f"{unique('witness')}@example.com", "mail")
+        route(shop, (0, witness))
+        until(lambda: deliveries(shop, witness, "delivered"))
+        assert len(deliveries(shop, gil)) == 2, "planned together, it was held back"
+        later(shop, gil)
+        assert until(lambda: mails[0].to(address)[2:])[0].startswith("Opposite effect")
 
     def test_a_test_can_be_sent(self, shop: Shop, mails: tuple[Mails, str]) -> None:
         address = f"{unique('eve')}@example.com"
