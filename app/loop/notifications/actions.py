@@ -45,7 +45,7 @@ def change_route(session: Session, number: int, given: RouteIn, caller: Caller) 
     """Replace a route. Raises `NotFound`, and `Invalid` as `add_route`."""
     row = queries.route(session, number, hold=True)
     _check_route(session, given)
-    before = {"name": row.name, "enabled": row.enabled, **row.rule}
+    before = _route_facts(row)
     row.name, row.enabled, row.rule = given.name, given.enabled, _rule(given)
     after = given.model_dump(mode="json")
     if before != after:
@@ -57,10 +57,15 @@ def change_route(session: Session, number: int, given: RouteIn, caller: Caller) 
 def delete_route(session: Session, number: int, caller: Caller) -> None:
     """Delete a route. Raises `NotFound`."""
     row = queries.route(session, number, hold=True)
-    before = {"name": row.name, "enabled": row.enabled, **row.rule}
+    before = _route_facts(row)
     session.delete(row)
     record(session, caller.name, "route deleted", f"notification-route/{number}", before, None)
     publish(session, _CHANGED)
+
+
+def _route_facts(row: NotificationRoute) -> dict[str, Any]:
+    """A route in the record of changes; what its stored rule is too old to name stands there as it is in effect."""
+    return RouteIn(name=row.name, enabled=row.enabled, **row.rule).model_dump(mode="json")
 
 
 def _rule(given: RouteIn) -> dict[str, Any]:

@@ -2,8 +2,12 @@
 
 import re
 import socket
+from collections.abc import Callable
+from concurrent.futures import Future
 from contextlib import suppress
+from contextvars import copy_context
 from ipaddress import IPv4Address, IPv6Address, IPv6Network, ip_address, ip_network
+from threading import BoundedSemaphore, Thread
 from typing import NamedTuple
 from urllib.parse import urlsplit
 
@@ -16,6 +20,9 @@ NAT64 = IPv6Network("64:ff9b::/96")
 INSIDE = [IPv6Network(each) for each in ("::/16", "64:ff9b:1::/48", "fec0::/10")]
 """Addresses that lead into the own network, though `is_global` holds for some of them."""
 APPRISE = "pip install inband[notify]"
+LOOK_UP = 2.0
+"""Seconds that a request waits for the name service."""
+_LOOKING = BoundedSemaphore(8)
 
 
 class Refused(Exception):
@@ -37,14 +44,15 @@ class Place(NamedTuple):
 def check(means: str, address: str, settings: Settings) -> None:
     """Refuse an address that cannot be one of this means, and a webhook that may not lead there. Raises `Refused`.
 
-    Only the name service is asked. Each delivery looks again, for a name may lead elsewhere by then.
+    Only the name service is asked, for `LOOK_UP` seconds at most: a request waits for it. Each delivery looks again, for a name
+    may lead elsewhere by then.
     """
     if means == "mail":
         if not MAIL.fullmatch(address) or ".." in address:
             raise Refused(_("must be one mail address, such as anna@example.com"))
     elif means == "webhook":
         with suppress(Unknown):
-            place_of(address, settings)
+            _within(LOOK_UP, lambda: place_of(address, settings))
     else:
         if not settings.allow_apprise:
             raise Refused(
@@ -58,6 +66,29 @@ def check(means: str, address: str, settings: Settings) -> None:
             raise Refused(_("needs the library apprise on the server: {command}").format(command=APPRISE)) from None
         if not Apprise().add(address):
             raise Refused(_("is no address that apprise knows, such as ntfy://topic"))
+
+
+def _within(seconds: float, work: Callable[[], Place]) -> Place:
+    """The result of work in a thread of its own. Raises what it raises; `Unknown` where it takes longer, or too many hang."""
+    late = Unknown(_("the name service does not answer"))
+    slots = _LOOKING
+    if not slots.acquire(blocking=False):
+        raise late
+    answer: Future[Place] = Future()
+
+    def run() -> None:
+        try:
+            answer.set_result(work())
+        except Exception as error:  # noqa: BLE001 - raised where it is waited for
+            answer.set_exception(error)
+        finally:
+            slots.release()
+
+    Thread(target=copy_context().run, args=(run,), name="name service", daemon=True).start()
+    try:
+        return answer.result(seconds)
+    except TimeoutError:
+        raise late from None
 
 
 def _parts(url: str) -> tuple[str, str, int]:

@@ -58,7 +58,7 @@ def delete_group(session: Session, number: int, caller: Caller) -> None:
 
 
 def _facts(row: ReceiverGroup) -> dict[str, object]:
-    return {"name": row.name, "members": row.members, "rota": row.rota}
+    return GroupIn(name=row.name, members=row.members, rota=row.rota).model_dump(mode="json")
 
 
 def _check(session: Session, given: GroupIn) -> None:

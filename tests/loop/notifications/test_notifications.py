@@ -7,6 +7,7 @@ from collections.abc import Iterator
 from datetime import UTC, datetime, timedelta
 from io import BytesIO
 from pathlib import Path
+from threading import BoundedSemaphore, Event
 from types import ModuleType
 from typing import Any
 
@@ -19,7 +20,7 @@ from sqlalchemy.orm import Session
 from app.access.tables import Person
 from app.db.engine import Database
 from app.language.times import begin_of_shift, end_of_shift
-from app.loop.notifications import means, notifier, sending
+from app.loop.notifications import addresses, means, notifier, sending
 from app.loop.notifications.addresses import Refused, place_of
 from app.loop.notifications.means import Answer, Job, Message, deliver
 from app.loop.notifications.picture import OUT
@@ -330,6 +331,27 @@ def test_a_dead_mail_server_disturbs_nothing(new_database: NewDatabase, hooks: H
     drop_database(url)
 
 
+def test_a_route_of_an_older_version_has_not_changed_when_it_is_saved(shop: Shop) -> None:
+    """Keys that came later are what they are without being stored."""
+    made = route(shop, (0, receiver(shop, "old@example.com", "mail")))
+    with shop.server.database.begin() as session:
+        session.execute(
+            text(
+                "UPDATE notification_route SET rule = jsonb_set(rule, '{steps}',"
+                " jsonb_build_array((rule -> 'steps' -> 0) - 'groups' - 'on_duty')) - 'digest' WHERE id = :id"
+            ),
+            {"id": made["id"]},
+        )
+    path = f"/notifications/routes/{made['id']}"
+    same = {name: value for name, value in made.items() if name not in {"id", "created_at", "created_by"}}
+    shop.call("PUT", path, **same)
+    written = shop.call("GET", f"/audit?subject=notification-route/{made['id']}")["items"]
+    assert [each["action"] for each in written] == ["route added"]
+    shop.call("PUT", path, **same | {"repeat": 5})
+    (changed, _added) = shop.call("GET", f"/audit?subject=notification-route/{made['id']}")["items"]
+    assert {name for name in changed["after"] if changed["before"][name] != changed["after"][name]} == {"repeat"}
+
+
 # --- one step of it at a time
 
 
@@ -519,6 +541,29 @@ def test_public_addresses_need_https(monkeypatch: pytest.MonkeyPatch) -> None:
     assert str(place_of("https://andon.example/x", Settings()).address) == PUBLIC
     permitted = Settings(webhook_networks="93.184.0.0/16")
     assert place_of("http://andon.example/x", permitted).port == 80
+
+
+def test_a_name_service_that_hangs_holds_no_request_and_each_delivery_looks_again(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    over = Event()
+    monkeypatch.setattr(addresses, "LOOK_UP", 0.05)
+    monkeypatch.setattr(addresses, "_LOOKING", BoundedSemaphore(2))
+    monkeypatch.setattr(
+        "app.loop.notifications.addresses.socket.getaddrinfo", lambda *_args, **_more: over.wait(60) and []
+    )
+    try:
+        for _each in range(4):  # beyond as many as may hang, too
+            addresses.check("webhook", "https://andon.example/x", Settings())
+        assert not over.is_set()
+    finally:
+        over.set()
+
+
+def test_a_name_that_leads_inside_is_refused_when_it_is_added(monkeypatch: pytest.MonkeyPatch) -> None:
+    found(monkeypatch, "10.1.2.3")
+    with pytest.raises(Refused, match="INBAND_WEBHOOK_NETWORKS"):
+        addresses.check("webhook", "https://andon.example/x", Settings())
 
 
 def webhook(url: str) -> Job:
