@@ -21,16 +21,17 @@ class AttentionReason(IntEnum):
     """Reasons for attention, from the most urgent on."""
 
     STOPPED = 1  # probe fault, paused, tool worn, held
-    OUTSIDE = 2  # the last part was out of tolerance, or somebody has to release a correction
+    OUTSIDE = 2  # the last part was out of tolerance
     ALARM = 3
-    NOT_EVALUATED = 4  # background work on it fails: what follows may be missing
-    SIGNAL = 5
-    NOT_CAPABLE = 6  # index below 1
-    WEAR = 7
-    HUNTING = 8
-    ALARM_FLOOD = 9
-    BARELY_CAPABLE = 10  # index below 1.33
-    OLD = 11
+    APPROVAL = 4  # somebody has to release a correction
+    NOT_EVALUATED = 5  # background work on it fails: what follows may be missing
+    SIGNAL = 6
+    NOT_CAPABLE = 7  # index below 1
+    WEAR = 8
+    HUNTING = 9
+    ALARM_FLOOD = 10
+    BARELY_CAPABLE = 11  # index below 1.33
+    OLD = 12
 
     @property
     def code(self) -> str:
@@ -46,6 +47,7 @@ STOPPED = frozenset(
         CharacteristicState.HELD,
     }
 )
+OUTSIDE = frozenset({CharacteristicState.OVERSIZE, CharacteristicState.UNDERSIZE})
 
 
 @dataclass(frozen=True, slots=True)
@@ -71,13 +73,14 @@ class AttentionInputs:
         """Reasons why it needs attention, the most urgent first; empty if it does not.
 
         >>> AttentionInputs(CharacteristicState.IN_BAND, 0, 2, 0.9, None, False, 0.0).reasons
-        (<AttentionReason.SIGNAL: 5>, <AttentionReason.NOT_CAPABLE: 6>)
+        (<AttentionReason.SIGNAL: 6>, <AttentionReason.NOT_CAPABLE: 7>)
         """
         ppk = inf if self.ppk is None else self.ppk
         holds = {
             AttentionReason.STOPPED: self.state in STOPPED,
-            AttentionReason.OUTSIDE: self.state in NEED_SOMEONE - STOPPED,
+            AttentionReason.OUTSIDE: self.state in OUTSIDE,
             AttentionReason.ALARM: self.alarms > 0 and self.state not in STOPPED,  # else that is its alarm
+            AttentionReason.APPROVAL: self.state in NEED_SOMEONE - STOPPED - OUTSIDE,
             AttentionReason.NOT_EVALUATED: self.failing,
             AttentionReason.SIGNAL: self.signals > 0,
             AttentionReason.NOT_CAPABLE: ppk < 1.0,
@@ -96,7 +99,10 @@ class AttentionInputs:
         >>> calm = AttentionInputs(CharacteristicState.IN_BAND, 0, 0, 1.7, None, False, 0.0)
         >>> near = AttentionInputs(CharacteristicState.IN_BAND, 0, 0, 1.9, 40.0, False, 0.0)
         >>> worn = AttentionInputs(CharacteristicState.TOOL_WORN, 1, 0, 1.9, None, False, 0.3)
-        >>> sorted([calm, near, worn], key=lambda each: each.rank) == [worn, near, calm]
+        >>> waiting = AttentionInputs(CharacteristicState.AWAITING_APPROVAL, 0, 0, 0.4, None, False, 0.0)
+        >>> alarmed = AttentionInputs(CharacteristicState.IN_BAND, 1, 0, 1.9, None, False, 0.0)
+        >>> ranked = [worn, alarmed, waiting, near, calm]
+        >>> sorted([calm, near, waiting, alarmed, worn], key=lambda each: each.rank) == ranked
         True
         """
         reasons = (*self.reasons, *(len(AttentionReason) + 1,) * len(AttentionReason))[: len(AttentionReason)]

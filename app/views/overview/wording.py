@@ -26,7 +26,7 @@ class Reason(NamedTuple):
     @property
     def is_state(self) -> bool:
         """True if it says no more than the state does."""
-        return self.reason <= AttentionReason.OUTSIDE
+        return self.reason in (AttentionReason.STOPPED, AttentionReason.OUTSIDE, AttentionReason.APPROVAL)
 
 
 def reasons(ranked: Ranked) -> list[Reason]:
@@ -43,6 +43,7 @@ def _reason(reason: AttentionReason, ranked: Ranked) -> Reason:
     text, href, tone = {
         AttentionReason.STOPPED: (state, board, tone_of(inputs.state)),
         AttentionReason.OUTSIDE: (state, page, tone_of(inputs.state)),
+        AttentionReason.APPROVAL: (state, "/corrections", tone_of(inputs.state)),
         AttentionReason.ALARM: (
             ngettext("%(num)s active alarm", "%(num)s active alarms", inputs.alarms) % {"num": inputs.alarms},
             board,

@@ -31,7 +31,10 @@ inputs = st.builds(
         ({"ppk": None}, ()),
         ({"state": CharacteristicState.TOOL_WORN, "alarms": 1}, (AttentionReason.STOPPED,)),
         ({"state": CharacteristicState.OVERSIZE, "alarms": 1}, (AttentionReason.OUTSIDE, AttentionReason.ALARM)),
-        ({"state": CharacteristicState.AWAITING_APPROVAL}, (AttentionReason.OUTSIDE,)),
+        (
+            {"state": CharacteristicState.AWAITING_APPROVAL, "alarms": 1},
+            (AttentionReason.ALARM, AttentionReason.APPROVAL),
+        ),
         ({"signals": 1, "ppk": 0.99}, (AttentionReason.SIGNAL, AttentionReason.NOT_CAPABLE)),
         ({"ppk": 1.0}, (AttentionReason.BARELY_CAPABLE,)),
         ({"ppk": 1.33}, ()),
