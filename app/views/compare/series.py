@@ -158,7 +158,8 @@ def tools_of(session: Session, current: CurrentCharacteristic) -> list[Compared]
         else:
             first = _first_that(session, Reading.received_at >= life.began_at, machine_id, characteristic_id, newest)
         if first <= last:
-            name = f"{current.characteristic.name}, {_life(life)}"
+            since = life.began_at and _cut_since(session, life.began_at, machine_id, characteristic_id, first)
+            name = f"{current.characteristic.name}, {_life(life, since)}"
             found.append(Compared(name, current, Window(first, last, newest), life.began_at or HISTORY_BEGINS))
             last = first - 1
     return found
@@ -170,10 +171,22 @@ def _by_tool(session: Session, current: CurrentCharacteristic, chosen: Sequence[
     return ([each for each in known if each.began_at in chosen] or known[:MOST_EACH])[::-1]
 
 
-def _life(life: Life) -> str:
-    if life.began_at is None:
+def _cut_since(session: Session, began_at: datetime, machine_id: int, characteristic_id: int, first: int) -> datetime:
+    """The moment since when it cut: that of its first reading, where this came later than it was measured."""
+    measured_at = session.scalar(
+        select(Reading.measured_at).where(
+            Reading.machine_id == machine_id,
+            Reading.characteristic_id == characteristic_id,
+            Reading.sequence == first,
+        )
+    )
+    return min(began_at, measured_at or began_at)
+
+
+def _life(life: Life, since: datetime | None) -> str:
+    if since is None:
         return _("first tool") if life.ended_at else _("tool")
-    return _("tool of {since}").format(since=as_read(life.began_at, "minutes"))
+    return _("tool of {since}").format(since=as_read(since, "minutes"))
 
 
 def _by_context(
