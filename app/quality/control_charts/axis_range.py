@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from app.charts import Dots, Labels, Series
 from app.core.spc.shewhart import Chart
 from app.language.i18n import _
-from app.language.numbers import signed
+from app.language.numbers import NO_BREAK_SPACE, signed
 from app.quality.control_charts.view import View
 
 ROOM = 0.08
@@ -94,12 +94,20 @@ def _spaced(
     late: NDArray[np.bool_],
     close: float,
 ) -> list[str]:
-    """The labels of points that lie too close to each other become one: behind the last, late ones before the first."""
+    """The labels of points that lie too close to each other on one edge become one, of the one that is farthest out.
+
+    It stands behind the last, before the first where one of them is late: `late` is set for that one.
+    """
     labels = [""] * len(said)
-    apart = (np.diff(x) > close) | (above[1:] != above[:-1]) | (late[1:] != late[:-1])
-    start = 0
-    for end in [*np.flatnonzero(apart).tolist(), len(said) - 1]:
-        label = said[start + int(np.argmax(size[start : end + 1]))] + "\N{NO-BREAK SPACE}"
-        labels[start if late[start] else end] = label if late[start] else "\N{NO-BREAK SPACE}" + label.strip()
-        start = end + 1
+    for edge in (above, ~above):
+        at = np.flatnonzero(edge)
+        meet = np.where(late[at][1:] == late[at][:-1], close, 2 * close)  # two labels between an early and a late one
+        for group in np.split(at, np.flatnonzero(np.diff(x[at]) > meet) + 1):
+            if group.size:
+                label = said[group[np.argmax(size[group])]]
+                before = bool(late[group].any())
+                late[group[0]] |= before
+                labels[group[0 if before else -1]] = (
+                    f"{label}{NO_BREAK_SPACE}" if before else f"{NO_BREAK_SPACE}{label}"
+                )
     return labels

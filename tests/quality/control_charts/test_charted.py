@@ -243,6 +243,13 @@ def test_of_points_beyond_that_are_neighbours_the_farthest_is_labelled() -> None
     assert [label.strip() for label in beyond["text"]] == ["", "", "+400 µm", "−380 µm"]
 
 
+def test_a_point_beyond_the_other_edge_between_two_neighbours_keeps_them_one_label() -> None:
+    values = [0.5, -0.5] * 50
+    values[80:85] = [-400, 0.5, 390, 0.5, -380]
+    beyond = traces(control_figure(seen(values), key="shaft", width=400))["beyond"]
+    assert [label.strip() for label in beyond["text"]] == ["−400 µm", "+390 µm", ""]
+
+
 def test_labels_beyond_do_not_meet_in_a_narrow_chart() -> None:
     values = [0.5, -0.5] * 50
     values[20], values[32] = -400, -380
