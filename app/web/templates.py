@@ -7,6 +7,7 @@ for forms), `to_do` (how many things wait for a person, or None if not known). `
 
 from __future__ import annotations
 
+import re
 import weakref
 from functools import cache
 from http import HTTPStatus
@@ -14,6 +15,7 @@ from threading import Lock
 from typing import TYPE_CHECKING, Any
 
 from jinja2 import Environment, FileSystemLoader, StrictUndefined, Template
+from markupsafe import Markup, escape
 from starlette.requests import Request
 from starlette.responses import HTMLResponse
 
@@ -62,6 +64,15 @@ class OneByOne(Environment):
             return super()._load_template(name, globals)
 
 
+def breaking(key: str) -> Markup:
+    """A key or a path that breaks after its separators alone, not in the middle of a word.
+
+    >>> breaking("correction/lathe-2")
+    Markup('correction/<wbr>lathe-2')
+    """
+    return Markup(re.sub("([/_.])", r"\1<wbr>", str(escape(key))))  # noqa: S704 - escaped
+
+
 @cache
 def environment() -> Environment:
     """The one Jinja2 environment: escaped, strict about missing names, translated. Made before threads ask for it."""
@@ -95,6 +106,7 @@ def environment() -> Environment:
         in_percent=numbers.in_percent,
         short=numbers.short,
         grouped=numbers.grouped,
+        breaking=breaking,
         when=numbers.when,
         as_field=period.field,
         ago=numbers.ago,
