@@ -38,6 +38,7 @@ from app.quality.capability.kinds import Week
 MOST_BARS, FEWEST_BARS = 60, 8
 CURVE = 161  # points of a drawn curve
 MOST_POINTS, TAIL = 600, 40  # of the probability plot, and of each of its ends that are drawn whichever
+BELOW = Share(-0.2)
 MOST_CHANGES = 60  # lines of tool changes; more are a fence
 SHARES = (0.00135, 0.01, 0.05, 0.25, 0.5, 0.75, 0.95, 0.99, 0.99865)
 
@@ -138,14 +139,15 @@ def probability(drawn: CapabilityChart) -> Chart:
 
 
 def small(chart: Chart) -> Chart:
-    """The same without a legend, for which there is no room."""
+    """The same without a legend, for which there is no room; readings beyond are named in place of the axis below."""
     panels = [
         replace(
             panel, marks=[replace(mark, name="") if isinstance(mark, Series | Bars) else mark for mark in panel.marks]
         )
         for panel in chart.panels
     ]
-    return replace(chart, panels=panels, room=Room(78, 22, 54, 40))
+    beyond = any(isinstance(mark, Note) and mark.y == BELOW for panel in panels for mark in panel.marks)
+    return replace(chart, panels=panels, x=replace(chart.x, title="") if beyond else chart.x, room=Room(78, 22, 54, 40))
 
 
 def _near(drawn: CapabilityChart) -> Floats:
@@ -165,7 +167,7 @@ def _beyond(drawn: CapabilityChart) -> list[Note]:
             )
             text %= {"num": len(values), "at": signed(furthest, 1)}
             words.append(f"◂ {text}" if left else f"{text} ▸")
-    where = Share(1), Share(-0.2)
+    where = Share(1), BELOW
     return [Note("  ".join(words), *where, "right", "top", size=13, colour="attention")] if words else []
 
 
