@@ -35,6 +35,8 @@ WITHOUT_BODY = {
     "DELETE /api/v1/notifications/groups/{group}",
     "POST /api/v1/notifications/receivers/{receiver}/test",
     "DELETE /api/v1/notifications/me",
+    "DELETE /api/v1/notifications/me/browser",
+    "POST /api/v1/notifications/me/browser/test",
     "DELETE /api/v1/machines/{machine}/keys/{key}",
     "DELETE /api/v1/keys/{key}",
     "DELETE /api/v1/wall-screens/{screen}",

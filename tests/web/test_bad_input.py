@@ -131,6 +131,8 @@ BODIES: dict[str, dict[str, Any]] = {
         "away_until": "2026-11-21T08:15:02Z",
         "shift_report": True,
     },
+    "PUT /api/v1/notifications/me/browser": {"quiet": [NIGHT], "away_until": "2026-11-21T08:15:02Z"},
+    "POST /api/v1/notifications/me/browser/messages": {"shown": [1]},
     "POST /api/v1/reactions/plans": REACTION | {"characteristic": "{characteristic}", "rule": "nelson_1"},
     "PUT /api/v1/reactions/plans/{plan}": REACTION | {"characteristic": "{characteristic}", "kind": "hunting"},
     "POST /api/v1/reactions/plans/{plan}/withdraw": WHY,
@@ -409,7 +411,7 @@ BODIES: dict[str, dict[str, Any]] = {
     "POST /api/v1/people/invitations": {"role": "viewer"},
     "POST /api/v1/keys": {"name": "Dashboard", "role": "viewer"},
 }
-OF_A_PERSON = {"PUT /api/v1/notifications/me"}  # the key that asks here is none
+OF_A_PERSON = {"PUT /api/v1/notifications/me", "PUT /api/v1/notifications/me/browser"}  # the key that asks here is none
 NEWER = {
     "POST /api/v1/machines/{machine}/heartbeat",
     "POST /api/v1/machines/{machine}/touch-tests/{number}/report",

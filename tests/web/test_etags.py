@@ -166,7 +166,10 @@ EDITS: dict[str, Callable[[Shop, int], Edit]] = {
 }
 
 
-OF_A_PERSON = {"PUT /notifications/me"}  # below; the key that asks for the others is none
+OF_A_PERSON = {
+    "PUT /notifications/me",
+    "PUT /notifications/me/browser",
+}  # below; the key that asks for the others is none
 
 
 def test_every_edit_takes_if_match_and_is_tried_here() -> None:
@@ -197,6 +200,20 @@ def test_a_change_of_what_has_changed_since_is_412(shop: Shop, operation: str) -
     assert tag(shop, path) in problem["detail"]
     assert edit(shop, method, path, second, tag(shop, path)).status_code == 200
     assert edit(shop, method, path, first).status_code == 200, "without If-Match nothing is compared"
+
+
+def test_the_quiet_hours_of_ones_browsers_are_guarded_too(shop: Shop) -> None:
+    person, path = Person(shop.server, "viewer"), "/api/v1/notifications/me/browser"
+    person.send("/account/notifications/browser")
+    seen = person.browser.get(path).headers["ETag"]
+
+    def set_quiet(begins: str) -> int:
+        body = {"quiet": [{"days": [1], "begins": begins, "ends": "06:00"}]}
+        return person.browser.put(
+            path, json=body, headers={"X-CSRF-Token": person.csrf(), "If-Match": seen}
+        ).status_code
+
+    assert [set_quiet(begins) for begins in ("20:00", "21:00")] == [200, 412]
 
 
 def test_of_two_windows_of_one_person_the_second_hears_of_the_first(shop: Shop) -> None:

@@ -404,6 +404,7 @@ FORMS: dict[str, tuple[str, ...] | None] = {
     "/machines/{machine}/tools/{number}": ("describe",),
     "/machines/{machine}/tools/{number}/{what}": ("edit_tool", "change_tool", "switch_tool"),
     "/account/notifications": None,
+    "/account/notifications/browser": None,
     "/setup/notifications/days-off": ("set_days_off",),
     "/setup/notifications/groups/new": ("add_receiver_group",),
     "/setup/notifications/groups/{group}": ("change_receiver_group", "delete_receiver_group"),

@@ -100,10 +100,11 @@ def add_receiver(session: Session, given: ReceiverIn, caller: Caller, settings: 
     _permitted(given.means, given.address, settings)
     if len(queries.receivers(session)) >= MOST_RECEIVERS:
         raise Conflict(_("There are {n} receivers already.").format(n=MOST_RECEIVERS), _("Delete one first."))
-    return _added(session, caller, Receiver(**given.model_dump(mode="json") | {"away_until": given.away_until}))
+    return added(session, caller, Receiver(**given.model_dump(mode="json") | {"away_until": given.away_until}))
 
 
-def _added(session: Session, caller: Caller, row: Receiver) -> Receiver:
+def added(session: Session, caller: Caller, row: Receiver) -> Receiver:
+    """Store a receiver, and its entry in the record of changes."""
     row.created_by = caller.name
     if row.means == "webhook":
         row.secret = secrets.token_urlsafe(32)
@@ -135,6 +136,8 @@ def change_receiver(
     session.flush()
     row = queries.receiver(session, number, hold=True)
     before, named = before or _facts(row), change.model_fields_set
+    if change.address is not None and row.means == "browser":
+        raise Invalid.at("address", _("is not for browsers: an open page fetches"))
     if change.address is not None and change.address != row.address:
         _permitted(row.means, change.address, settings)
         row.address, row.failures, row.retry_at = change.address, 0, None
@@ -220,7 +223,7 @@ def set_own(session: Session, given: OwnAddressIn, caller: Caller, settings: Set
         return change_receiver(session, row.id, change, caller, settings, before)
     _permitted("mail", given.address, settings)
     given_quiet = [each.model_dump() for each in given.quiet]
-    return _added(
+    return added(
         session,
         caller,
         Receiver(

@@ -9,13 +9,17 @@ from app.access.deps import Admin, Viewer, require
 from app.errors import NotFound
 from app.language.i18n import _
 from app.language.times import local
-from app.loop.notifications import actions, calendar_actions, calendar_queries, group_actions, queries
+from app.loop.notifications import actions, browser_actions, calendar_actions, calendar_queries, group_actions, queries
 from app.loop.notifications.calendar_schemas import CalendarIn, CalendarOut, ComingOut
 from app.loop.notifications.group_schemas import DutyOut, GroupIn, GroupOut
 from app.loop.notifications.schemas import (
     DeliveryOut,
+    MessageOut,
+    MessagesOut,
     NewReceiverOut,
     OwnAddressIn,
+    OwnBrowserIn,
+    PageIn,
     ReceiverChange,
     ReceiverIn,
     ReceiverOut,
@@ -73,7 +77,7 @@ def delete_notification_route(session: SessionDep, caller: Admin, route: RouteId
 
 @router.get("/notifications/receivers", dependencies=ADMIN)
 def list_receivers(session: SessionDep, after: After = 0, limit: Limit = 100) -> Page[ReceiverOut]:
-    """Receivers: mail addresses, people's own too, webhooks, addresses of apprise. Never with a secret."""
+    """Receivers: mail addresses, webhooks, addresses of apprise, people's own addresses and browsers. Never with a secret."""
     rows = [ReceiverOut.of(row) for row in queries.receivers(session, after, limit + 1)]
     return page_of(rows, limit, lambda row: row.id)
 
@@ -220,3 +224,37 @@ def delete_own_address(session: SessionDep, caller: Viewer) -> Response:
     """Delete your mail address; 409 while a route names it."""
     actions.delete_own(session, caller)
     return Response(status_code=204)
+
+
+@router.get("/notifications/me/browser", responses=problems(404) | TAGGED)
+@tagged
+def get_own_browser(session: SessionDep, caller: Viewer) -> ReceiverOut:
+    """Your own browsers as a receiver; 404 where they show no notifications."""
+    return ReceiverOut.of(browser_actions.own_browser(session, caller))
+
+
+@router.put("/notifications/me/browser", responses=problems(404, 412))
+@guarded(get_own_browser, queries.hold_own)
+def set_own_browser(session: SessionDep, caller: Viewer, settings: SettingsDep, given: OwnBrowserIn) -> ReceiverOut:
+    """Let your browsers show notifications while a page of Inband is open in one. An administrator puts you into routes."""
+    return ReceiverOut.of(browser_actions.set_browser(session, caller, settings, given))
+
+
+@router.delete("/notifications/me/browser", status_code=204, responses=problems(404, 409))
+def delete_own_browser(session: SessionDep, caller: Viewer) -> Response:
+    """Show notifications in none of your browsers any more; 409 while a route names them."""
+    browser_actions.delete_browser(session, caller)
+    return Response(status_code=204)
+
+
+@router.post("/notifications/me/browser/test", status_code=202, responses=problems(404))
+def send_test_to_own_browser(session: SessionDep, caller: Viewer) -> DeliveryOut:
+    """Send a test to your own browsers; a page that is open shows it within seconds."""
+    row = browser_actions.own_browser(session, caller)
+    return DeliveryOut.of(actions.ask_for_test(session, row.id, caller))
+
+
+@router.post("/notifications/me/browser/messages")
+def take_messages(session: SessionDep, caller: Viewer, page: PageIn) -> MessagesOut:
+    """As an open page asks: its messages of the last minute, and what it has shown, which is delivered then. None without a receiver."""
+    return MessagesOut(items=[MessageOut.of(row) for row in browser_actions.take(session, page, caller)])

@@ -16,6 +16,8 @@ log = logging.getLogger(__name__)
 
 MOST_IN_WORDS = 20
 """Alarms that a message describes; of more it says how many they are."""
+MOST_SHOWN = 3
+"""Alarms that a notification of a browser describes: it shows few lines."""
 
 
 def of_alarms(
@@ -131,6 +133,12 @@ def change(number: int, at: datetime, said: Mapping[str, Any], address: str) -> 
         "tool": f"{api}/machines/{machine}/tools/{said.get('tool')}",
     }
     return {"event": number, "at": at, **said, "link": found.get(str(said.get("kind")), "")}
+
+
+def in_short(made: Message) -> str:
+    """The words of a browser's notification below its heading: of each alarm what is wrong and what to do."""
+    said = [f"{each['text']} {each['what_to_do']}" for each in made.data.get("alarms", ())[:MOST_SHOWN]]
+    return "\n\n".join(said) or made.data["text"]
 
 
 def of_test(name: str, by: str, address: str) -> Message:

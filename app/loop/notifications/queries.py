@@ -1,9 +1,10 @@
 """Queries of routes, receivers and deliveries. Never writes."""
 
 from collections.abc import Collection, Iterable, Mapping, Sequence
+from datetime import timedelta
 from typing import Any, NamedTuple
 
-from sqlalchemy import or_, select
+from sqlalchemy import func, or_, select
 from sqlalchemy.orm import Session
 
 from app.access.queries import hold_person
@@ -52,14 +53,16 @@ def receiver(session: Session, number: int, *, hold: bool = False) -> Receiver:
     return found
 
 
-def own(session: Session, person_id: int | None) -> Receiver | None:
-    """The mail address that a person has given; None without one."""
-    query = select(Receiver).where(Receiver.person_id == person_id, Receiver.deleted_at.is_(None))
+def own(session: Session, person_id: int | None, means: str = "mail") -> Receiver | None:
+    """The mail address that a person has given, or their browsers; None without."""
+    query = select(Receiver).where(
+        Receiver.person_id == person_id, Receiver.means == means, Receiver.deleted_at.is_(None)
+    )
     return session.scalars(query).one_or_none()
 
 
 def hold_own(session: Session, given: Mapping[str, Any]) -> None:
-    """Hold the caller until the transaction ends, and so the address that this person has given or not."""
+    """Hold the caller until the transaction ends, and so the address and the browsers that this person has given or not."""
     hold_person(session, {"person": given["caller"].person_id})
 
 
@@ -119,6 +122,17 @@ def names(session: Session, numbers: Collection[int]) -> dict[int, str]:
     return {
         row.id: row.name for row in session.execute(select(Receiver.id, Receiver.name).where(Receiver.id.in_(numbers)))
     }
+
+
+def messages(session: Session, receiver_id: int) -> Sequence[Delivery]:
+    """Messages of the last minute for somebody's browsers, the oldest first, those that one of them has shown too."""
+    query = select(Delivery).where(
+        Delivery.receiver_id == receiver_id,
+        Delivery.state.in_(("sending", "delivered")),
+        Delivery.words.is_not(None),
+        func.coalesce(Delivery.ended_at, func.now()) > func.now() - timedelta(minutes=1),
+    )
+    return session.scalars(query.order_by(Delivery.id)).all()
 
 
 class DeliveryRow(NamedTuple):

@@ -14,6 +14,8 @@ from app.loop.notifications.tables import Delivery, NotificationRoute, Receiver
 from app.web.fields import LARGEST_ID, Body, Moment, Slug, Text200, answer_from
 
 Means = Literal["mail", "webhook", "apprise"]
+"""Ways to receivers that an administrator adds."""
+AnyMeans = Literal["mail", "webhook", "apprise", "browser"]
 Tone = Literal["stop", "wear", "attention", "waiting", "steady"]
 Changes = Literal["alarm", "reading", "correction", "tool"]
 
@@ -203,14 +205,60 @@ class OwnAddressIn(Body):
     shift_report: AtEndOfShift = False
 
 
+class OwnBrowserIn(Body):
+    """One's own browsers as a receiver."""
+
+    quiet: Annotated[Week, Field(description="Quiet hours: then only urgent routes reach them.")] = Field(
+        default_factory=list
+    )
+    away_until: Annotated[Moment | None, Field(description="Nothing is shown before.")] = None
+
+
+class PageIn(Body):
+    """The messages that an open page has shown."""
+
+    shown: Annotated[Numbers, Field(description="Messages that it has shown: they count as delivered.")] = Field(
+        default_factory=list
+    )
+
+
+class MessageOut(BaseModel):
+    """A message that a page shows as a notification of its browser."""
+
+    id: Annotated[int, Field(description="Number of the delivery.")]
+    about: Annotated[Literal["alarms", "test"], Field(description="Its content.")]
+    subject: Annotated[str, Field(description="Its heading.")]
+    words: Annotated[str, Field(description="What is wrong, and what to do.")]
+    alarms: Annotated[list[int], Field(description="Numbers of the alarms in it.")]
+    path: Annotated[
+        str, Field(description="Page that it leads to, from the root of the plant.", examples=["/alarms/412"])
+    ]
+
+    @classmethod
+    def of(cls, row: Delivery) -> Self:
+        """A message of the table."""
+        path = "/account/notifications"
+        if row.about == "alarms":
+            path = f"/alarms/{row.alarms[0]}" if len(row.alarms) == 1 else "/alarms"
+        return answer_from(cls, row, path=path)
+
+
+class MessagesOut(BaseModel):
+    """Messages for an open page, the oldest first."""
+
+    items: list[MessageOut]
+
+
 class ReceiverOut(BaseModel):
     """A receiver of notifications."""
 
     id: int
     name: str
-    means: Annotated[Means, Field(description="The way to it: mail, webhook or apprise.")]
-    address: Annotated[str, Field(description="Of apprise only the service: the rest is a secret.")]
-    person: Annotated[int | None, Field(description="Number of the person whose own address it is.")]
+    means: Annotated[AnyMeans, Field(description="The way to it.")]
+    address: Annotated[
+        str, Field(description="Of apprise only the service: the rest is a secret. Of browsers empty: they fetch.")
+    ]
+    person: Annotated[int | None, Field(description="Number of the person whose own address or browsers it is.")]
     quiet: Annotated[list[HoursIn], Field(description="Quiet hours.")]
     away_until: Annotated[datetime | None, Field(description="Nothing is sent before.")]
     events: Annotated[list[Changes], Field(description="Changes that it gets as they happen.")]
@@ -237,6 +285,8 @@ class NewReceiverOut(ReceiverOut):
 
 def shown_address(row: Receiver) -> str:
     """Its address as people may see it."""
+    if row.means == "browser":
+        return ""
     return f"{row.address.partition('://')[0]}://…" if row.means == "apprise" else row.address
 
 

@@ -20,6 +20,7 @@ from app.core import notify
 from app.core.notify import NEVER, Notice, Raised, Record, Route, Step, notices, pause_after
 from app.db.events import publish
 from app.db.tables import Event
+from app.language.i18n import _
 from app.language.times import end_of_shift, plant_zone
 from app.loop.alarm_response.queries import AlarmRow, alarm
 from app.loop.alarm_response.reaction_queries import Reactions, plans_in_force, trouble_of
@@ -38,6 +39,8 @@ from app.loop.tables.machines import Machine
 from app.web.states import URGENCY
 
 BUSY = timedelta(minutes=1)
+SHOWN_WITHIN = timedelta(seconds=10)
+"""In which an open page has to show a message of a browser: then the next one is reached within 30 s of the alarm."""
 KEPT = timedelta(days=31)
 """Time that deliveries stay on record, and what was announced."""
 CHATTER = timedelta(days=7)
@@ -77,7 +80,7 @@ def plan(session: Session, address: str, days_off: frozenset[date]) -> list[Job]
     jobs += filter(None, (_about_changes(session, rows[number], address) for number in sorted(free)))
     for job in jobs:
         rows[job.receiver].busy_until = now + BUSY
-    return jobs
+    return [job for job in jobs if not _offered(session, job, rows[job.receiver])]
 
 
 ShiftReport = Callable[[Session, datetime, str], tuple[str, str] | None]
@@ -127,12 +130,31 @@ def _may_have(row: Receiver, now: datetime) -> bool:
 
 
 def _give_up(session: Session, now: datetime) -> None:
-    """Note which deliveries a server has begun and not ended."""
+    """Note which deliveries no page has shown in time, and which a server has begun and not ended."""
+    offered = select(Delivery).join(Receiver, Receiver.id == Delivery.receiver_id)
+    late = Receiver.busy_until < now + BUSY - SHOWN_WITHIN
+    for row in session.scalars(offered.where(Delivery.state == "sending", Delivery.words.is_not(None), late)).all():
+        end(session, job_of(row), Answer(delivered=False, text=_("No open page of Inband has shown it.")))
     session.execute(
         update(Delivery)
         .where(Delivery.state == "sending", Delivery.asked_at < now - 2 * BUSY)
         .values(state="lost", ended_at=now)
     )
+
+
+def _offered(session: Session, job: Job, row: Receiver) -> bool:
+    """Tell if a delivery is one that pages fetch; then it waits for them, and they hear of it once this is committed."""
+    if job.means != "browser":
+        return False
+    delivery = session.get_one(Delivery, job.delivery)
+    delivery.words = message.in_short(job.message)
+    publish(session, {"kind": "delivery", "id": job.delivery, "person": row.person_id})
+    return True
+
+
+def job_of(row: Delivery) -> Job:
+    """The job of a delivery that pages fetch."""
+    return Job(row.id, row.receiver_id, row.about, "browser", "", None, Message(row.subject, ""), tuple(row.alarms))
 
 
 def _job(session: Session, row: Receiver, about: str, made: Message, **more: Any) -> Job:
@@ -348,11 +370,14 @@ def _about_changes(session: Session, row: Receiver, address: str) -> Job | None:
 
 
 def end(session: Session, job: Job, answer: Answer) -> None:
-    """Keep what came of a delivery; a receiver that was not reached pauses, the longer the more often it fails."""
+    """Keep what came of a delivery; a receiver that was not reached pauses, the longer the more often it fails.
+
+    What was delivered stays so.
+    """
     now: datetime = session.scalars(select(func.clock_timestamp())).one()
-    delivery = session.get(Delivery, job.delivery, with_for_update=True)
-    row = session.get(Receiver, job.receiver, with_for_update=True)
-    if delivery is None or row is None:
+    delivery = session.get(Delivery, job.delivery, with_for_update=True, populate_existing=True)
+    row = session.get(Receiver, job.receiver, with_for_update=True, populate_existing=True)
+    if delivery is None or row is None or delivery.state == "delivered":
         return
     delivery.state = "delivered" if answer.delivered else "failed"
     delivery.ended_at, delivery.answer = now, answer.text
@@ -365,7 +390,8 @@ def end(session: Session, job: Job, answer: Answer) -> None:
         row.retry_at = now + pause_after(row.failures)
         if answer.perhaps and job.alarms:
             row.last_at = now  # it may have arrived: the next message waits its minute
-    publish(session, {"kind": "delivery", "id": job.delivery})
+    of_browser = {"person": row.person_id} if row.means == "browser" else {}
+    publish(session, {"kind": "delivery", "id": job.delivery, **of_browser})
 
 
 def _arrived(session: Session, row: Receiver, job: Job, now: datetime) -> None:

@@ -19,14 +19,15 @@ DELIVERY_NUMBERS = Sequence("delivery_id", metadata=Base.metadata)
 
 
 class Receiver(Base):
-    """Somebody's mail address, a webhook, or an address of apprise. Deleted ones stay, because deliveries name them."""
+    """Somebody's mail address or browsers, a webhook, or an address of apprise. Deleted ones stay, because deliveries name them."""
 
     __tablename__ = "receiver"
     __table_args__ = (
-        CheckConstraint("means IN ('mail', 'webhook', 'apprise')", name="means"),
+        CheckConstraint("means IN ('mail', 'webhook', 'apprise', 'browser')", name="means"),
         Index(
             "receiver_person_key",
             "person_id",
+            "means",
             unique=True,
             postgresql_where=text("person_id IS NOT NULL AND deleted_at IS NULL"),
         ),
@@ -38,7 +39,7 @@ class Receiver(Base):
     means: Mapped[str]
     address: Mapped[str]
     secret: Mapped[str | None]  # a webhook's messages are signed with it
-    person_id: Mapped[int | None] = mapped_column(ForeignKey("person.id"))  # whose own address it is
+    person_id: Mapped[int | None] = mapped_column(ForeignKey("person.id"))  # whose own address or browsers it is
     quiet: Mapped[list[Any]] = mapped_column(server_default="[]")
     away_until: Mapped[datetime | None]
     events: Mapped[list[Any]] = mapped_column(server_default="[]")  # kinds of changes that a webhook gets
@@ -108,7 +109,10 @@ class Announced(Base):
 
 
 class Delivery(Base):
-    """One attempt to deliver a message, and what was answered. alarms, changes: their numbers in it."""
+    """One attempt to deliver a message, and what was answered. alarms, changes: their numbers in it.
+
+    words: of a message that a browser shows, which fetches it; None for other means.
+    """
 
     __tablename__ = "delivery"
     __table_args__ = (
@@ -122,6 +126,7 @@ class Delivery(Base):
     receiver_id: Mapped[int] = mapped_column(ForeignKey("receiver.id"))
     about: Mapped[str]
     subject: Mapped[str]
+    words: Mapped[str | None]
     alarms: Mapped[list[Any]] = mapped_column(server_default="[]")
     changes: Mapped[int] = mapped_column(server_default="0")
     state: Mapped[str]

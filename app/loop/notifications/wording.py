@@ -11,7 +11,9 @@ from app.loop.notifications.tables import ReceiverGroup
 
 def means_word(means: str) -> str:
     """The name of a means."""
-    return {"mail": _("Mail"), "webhook": _("Webhook"), "apprise": _("apprise")}.get(means, means)
+    return {"mail": _("Mail"), "webhook": _("Webhook"), "apprise": _("apprise"), "browser": _("Browser")}.get(
+        means, means
+    )
 
 
 def changes_word(kind: str) -> str:

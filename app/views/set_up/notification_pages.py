@@ -1,6 +1,6 @@
-"""Pages of notifications: receivers, routes and deliveries for administrators; one's own mail address."""
+"""Pages of notifications: receivers, routes and deliveries for administrators; one's own mail address and browsers."""
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from datetime import UTC, datetime
 from functools import partial
 from typing import Any
@@ -14,9 +14,9 @@ from app.errors import Conflict, InbandError, Invalid
 from app.language.i18n import _
 from app.language.times import local
 from app.loop.alarms.kinds import kinds
-from app.loop.notifications import actions, queries
+from app.loop.notifications import actions, browser_actions, queries
 from app.loop.notifications.calendar_queries import coming
-from app.loop.notifications.schemas import OwnAddressIn, ReceiverIn, RouteIn, shown_address
+from app.loop.notifications.schemas import OwnAddressIn, OwnBrowserIn, ReceiverIn, RouteIn, shown_address
 from app.loop.notifications.wording import (
     changes_word,
     delivery_word,
@@ -278,7 +278,7 @@ def _hours(form: Mapping[str, str], name: str, days: Any) -> list[dict[str, Any]
     return [{"days": list(days), "begins": begins, "ends": ends}] if begins or ends else []
 
 
-# --- one's own address
+# --- one's own address and browsers
 
 
 @router.get("/account/notifications")
@@ -306,6 +306,27 @@ def send_own(request: Request, session: SessionDep, caller: Viewer, settings: Se
     return RedirectResponse(f"/account/notifications?done={form.get('do') or 'saved'}", 303)
 
 
+@router.post("/account/notifications/browser")
+def send_own_browser(
+    request: Request, session: SessionDep, caller: Viewer, settings: SettingsDep, form: FormDep
+) -> Response:
+    try:
+        with session.begin_nested():
+            if form.get("do") == "delete":
+                browser_actions.delete_browser(session, caller)
+            elif form.get("do") == "test":
+                actions.ask_for_test(session, browser_actions.own_browser(session, caller).id, caller)
+            else:
+                given = parsed(OwnBrowserIn, {"quiet": _hours(form, "quiet", EVERY_DAY)})
+                browser_actions.set_browser(session, caller, settings, given)
+    except InbandError as error:
+        if caller.person_id is None:
+            raise
+        return _own(request, session, caller, None, error=error, of_browser=form)
+    done = {"delete": "no-browser", "test": "test"}.get(form.get("do", ""), "browser")
+    return RedirectResponse(f"/account/notifications?done={done}#browser", 303)
+
+
 def _own(
     request: Request,
     session: Session,
@@ -314,19 +335,35 @@ def _own(
     *,
     done: str = "",
     error: InbandError | None = None,
+    of_browser: Mapping[str, str] | None = None,
 ) -> Response:
-    row = queries.own(session, caller.person_id) if caller.person_id is not None else None
+    """of_browser: the form of the browsers, which came back with an error."""
+    person = caller.person_id
+    row, browser = (queries.own(session, person, each) if person is not None else None for each in ("mail", "browser"))
+    errors = by_field(error) if error else {}
     if form is None:
-        quiet = row.quiet[0] if row and row.quiet else {}
-        form = {f"quiet-{name}": quiet.get(name, "") for name in ("begins", "ends")}
-        form |= {"address": row.address if row else "", "shift_report": "true" if row and row.shift_report else ""}
+        form = _quiet(row.quiet if row else ()) | {
+            "address": row.address if row else "",
+            "shift_report": "true" if row and row.shift_report else "",
+        }
     return page(
         request,
         "access/notifications.html",
         status=error.status if error else 200,
         row=row,
         form=form,
-        errors=by_field(error) if error else {},
+        errors={} if of_browser is not None else errors,
+        browser=browser,
+        browser_form=_quiet(browser.quiet if browser else ()) if of_browser is None else of_browser,
+        browser_errors={} if of_browser is None else errors,
+        last=next(iter(queries.deliveries(session, receiver_id=browser.id, limit=1)), None) if browser else None,
+        delivery_word=delivery_word,
         problem=error if error and not error.errors else None,
         done=done,
     )
+
+
+def _quiet(stored: Sequence[Any]) -> dict[str, str]:
+    """The quiet hours of a form: the first of those stored."""
+    quiet = stored[0] if stored else {}
+    return {f"quiet-{name}": quiet.get(name, "") for name in ("begins", "ends")}

@@ -18,13 +18,14 @@ import "./times.js";
 // What only some pages have is loaded where it stands: with the page, or with a live part that brings it.
 const SOMETIMES = [
   ["plotly-chart", "./plotly-chart.js"], ["period-presets", "./period-presets.js"], ["table[data-sortable], table.as-cards", "./table-tools.js"],
-  [".picker, .period-picker", "./pickers.js"], ["[data-term]", "./terms.js"],
+  [".picker, .period-picker", "./pickers.js"], ["[data-term]", "./terms.js"], ["notify-here", "./notify-here.js"],
 ];
 function load() {
   for (const [selector, module] of SOMETIMES) if (document.querySelector(selector)) import(module);
 }
 load();
 document.addEventListener("livepart", load);
+if (globalThis.Notification?.permission === "granted" && document.querySelector("meta[name=person]")) import("./notices.js");
 
 document.addEventListener("click", (event) => {
   const opener = event.target.closest("[data-opens]");
