@@ -51,6 +51,7 @@ def demo(
     from app.simulators.demo import people
 
     os.environ.setdefault("INBAND_WEBHOOK_NETWORKS", "127.0.0.1/32")  # its andon listens on this computer
+    os.environ.setdefault("INBAND_PART_COST", "18")  # the ledger counts in money
     settings = settings_from(
         host=host, port=port, data_dir=data_dir, database_url=database_url, log_level=log_level, log_format=log_format
     )

@@ -6,6 +6,7 @@ import threading
 from http.server import BaseHTTPRequestHandler, HTTPServer
 from typing import Any
 
+from app.simulators.demo import duty
 from inband_client import Client, Invalid
 
 log = logging.getLogger(__name__)
@@ -51,9 +52,15 @@ def _add(admin: Client, address: str) -> None:
         return
     receiver = {"name": NAME, "means": "webhook", "address": address, "events": ["tool"]}
     number = admin.post("/notifications/receivers", receiver)["id"]
-    steps = [{"after": 0, "receivers": [number]}]
-    for name, more in (
-        ("Stopped or worn", {"tones": ["stop", "wear"], "repeat": 30, "urgent": True}),
-        ("Everything else, every hour", {"tones": ["attention", "waiting"], "digest": 60}),
+    andon = {"after": 0, "receivers": [number]}
+    group = duty.group(admin)
+    later = [{"after": 10, "on_duty": [group]}] if group is not None else []
+    for name, steps, more in (
+        ("Stopped or worn", [andon, *later], {"tones": ["stop", "wear"], "repeat": 30, "urgent": True}),
+        (
+            "Everything else, every hour",
+            [andon],
+            {"tones": ["attention", "waiting"], "digest": 60, "on_days_off": False},
+        ),
     ):
         admin.post("/notifications/routes", {"name": name, "steps": steps, **more})

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from datetime import UTC, datetime
 from random import Random
 
-from app.simulators.demo import andon, calibrating, plant, reacting, touching, turning
+from app.simulators.demo import andon, calibrating, duty, plant, reacting, touching, turning
 from app.simulators.demo.running import Line, Pace
 from app.simulators.demo.simulation import Machine
 from inband_client import Client, NotFound
@@ -77,6 +77,7 @@ def lines(
         gateway = client(new_key(admin, f"/machines/{spec.key}/keys", {"name": KEY_NAME}))
         rng = Random(f"{seed}:{spec.key}:operator")
         simulated.append(Line(Machine(spec, seed), gateway, operator, run, rng, ending, causes))
+    duty.set_up(admin)
     andon.start(admin)
     admin.close()
     return simulated

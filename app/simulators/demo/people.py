@@ -12,10 +12,12 @@ from pathlib import Path
 from sqlalchemy.orm import Session
 
 from app.access import actions, queries, screens
+from app.access.callers import Caller
 from app.db.engine import Database
 from app.errors import InbandError
 from app.language.i18n import _
 from app.loop.machines import queries as machines
+from app.loop.notifications import browser_actions
 from app.settings import Settings
 from app.simulators.demo import plant
 
@@ -43,7 +45,8 @@ def sign_ins(database: Database, settings: Settings) -> dict[str, str]:
         for name, role in PEOPLE.items():
             if queries.person_named(session, name) is None:
                 passwords[name] = known.get(name) or _password()
-                actions.add_person(session, name=name, role=role, password=passwords[name], actor=ACTOR)
+                person = actions.add_person(session, name=name, role=role, password=passwords[name], actor=ACTOR)
+                browser_actions.set_browser(session, Caller("person", name, person_id=person.id), settings)
             elif name in known:
                 passwords[name] = known[name]
         kept = {name: known[name] for name in known.keys() - PEOPLE} | passwords
