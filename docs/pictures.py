@@ -24,12 +24,16 @@ DRAWN = "() => [...document.querySelectorAll('plotly-chart')].every((chart) => c
 
 
 class Picture(NamedTuple):
-    """A picture: address of the page, the part of it that is shown, and the size of the screen."""
+    """A picture: address of the page, the part of it that is shown, and the size of the screen.
+
+    newest: a list of the API; `{id}` in the address is the number of its first item.
+    """
 
     address: str
     part: str = "main"
     size: tuple[int, int] = (1180, 760)
     person: str = "engineer"
+    newest: str = ""
 
 
 PICTURES = {
@@ -44,6 +48,10 @@ PICTURES = {
     "wear-curve": Picture("/characteristics/shaft-d40", "#wear-curve", (1180, 1500)),
     "shift": Picture("/shift"),
     "notifications": Picture("/setup/notifications", size=(1180, 640), person="admin"),
+    "groups": Picture("/setup/notifications", "section.card:has(#groups)", (1180, 1600), "admin"),
+    "days-off": Picture("/setup/notifications/days-off", size=(1180, 700), person="admin"),
+    "own-notifications": Picture("/account/notifications", "#browser", (1000, 1200), "operator"),
+    "reaction-plan": Picture("/alarms/{id}", size=(1000, 1240), newest="/api/v1/alarms?kind=tool_worn&limit=1"),
     "wall-screen": Picture("/wall#{wall screen}", "body", (1280, 720)),
     "alarm-load": Picture("/alarms/load", size=(1180, 760)),
     "causes": Picture("/alarms/causes", size=(1000, 560)),
@@ -59,9 +67,12 @@ PICTURES = {
 def taken(browser: Browser, url: str, people: dict[str, str], picture: Picture) -> bytes:
     """The picture as PNG."""
     width, height = picture.size
-    page = browser.new_page(base_url=url, viewport={"width": width, "height": height}, color_scheme="light")
+    page = browser.new_page(
+        base_url=url, viewport={"width": width, "height": height}, color_scheme="light", permissions=["notifications"]
+    )
     _sign_in(page, picture.person, people[picture.person])
-    page.goto(picture.address.format_map(people))
+    known = people | (page.request.get(picture.newest).json()["items"][0] if picture.newest else {})
+    page.goto(picture.address.format_map(known))
     if picture.address.startswith("/wall"):
         page.locator(".wall-machines").wait_for()
     for _tenth in range(LONGEST * 10):  # the page's policy lets no string be evaluated in it again and again
