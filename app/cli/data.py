@@ -14,6 +14,7 @@ import typer
 
 from app.cli import aqdef
 from app.cli.base import DatabaseUrl, DataDir, cli, existing, people, say, settings_from
+from app.cli.context import OfContext, chosen_context
 from app.errors import Invalid
 from app.language.i18n import _, ngettext
 from app.language.times import MINUTES, in_zone, plant_zone, written
@@ -314,6 +315,7 @@ def export_file(
     until: Annotated[str | None, typer.Option("--to", envvar="INBAND_TO", help=UNTIL)] = None,
     last: Annotated[int | None, typer.Option(envvar="INBAND_LAST", min=1, help="Only the last N.")] = None,
     timezone: Zone = None,
+    context: OfContext = None,
     format_: Annotated[Format | None, typer.Option("--format", envvar="INBAND_FORMAT", show_default="csv")] = None,
     output: Annotated[
         Path | None,
@@ -328,7 +330,9 @@ def export_file(
 
     zone = _zone(timezone)
     period = _period(since, until, zone)
-    if format_ is Format.DFQ or (format_ is None and output is not None and output.suffix.lower() == ".dfq"):
+    dfq = format_ is Format.DFQ or (format_ is None and output is not None and output.suffix.lower() == ".dfq")
+    chosen = chosen_context(context, aqdef=dfq)
+    if dfq:
         if output is None:
             raise typer.BadParameter(_("name the file: AQDEF is not written to standard output"), param_hint="--output")
         keys = [key.strip() for key in characteristic.split(",") if key.strip()]
@@ -346,7 +350,7 @@ def export_file(
     ):
         entry = queries.entry_named(session, characteristic)
         ends = exporting.Ends()
-        exported = ends.of(exporting.rows(session, entry, period=period, last=last))
+        exported = ends.of(exporting.rows(session, entry, period=period, last=last, chosen=chosen))
         with _output(output) as target, in_zone(zone):
             count = (exporting.write_ndjson if lines_wanted else exporting.write_csv)(exported, target)
         audit.record(
@@ -354,7 +358,7 @@ def export_file(
             f"command line ({getpass.getuser()})",
             "readings exported",
             f"characteristic/{characteristic}",
-            after={"readings": count, "format": "ndjson" if lines_wanted else "csv"},
+            after={"readings": count, "format": "ndjson" if lines_wanted else "csv", "context": dict(chosen)},
         )
     text = ngettext("%(num)d reading written", "%(num)d readings written", count) % {"num": count}
     with in_zone(zone):

@@ -10,11 +10,12 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from app.cli.base import DatabaseUrl, DataDir, cli, existing, people, say, settings_from
+from app.cli.context import OfContext, chosen_context
 from app.cli.data import SINCE, UNTIL, Zone
 from app.errors import InbandError
 from app.files.documents.content import Format, Paper
 from app.language.i18n import _, ngettext
-from app.views.reports.request import ReportRequest, SectionName, context_of, typed
+from app.views.reports.request import ReportRequest, SectionName, typed
 
 if TYPE_CHECKING:
     from app.db.engine import Database
@@ -38,14 +39,7 @@ def report_files(
         ),
     ] = None,
     timezone: Zone = None,
-    context: Annotated[
-        list[str] | None,
-        typer.Option(
-            help="Only readings that say this in their context: order=A-4711; may be named more than once.",
-            metavar="FIELD=VALUE",
-            show_default="all readings",
-        ),
-    ] = None,
+    context: OfContext = None,
     section: Annotated[
         list[SectionName] | None,
         typer.Option(help="Only this section; may be named more than once.", show_default="all"),
@@ -77,7 +71,7 @@ def report_files(
             "paper": paper.value,
         },
         [name.value for name in section or ()],
-        context_of(_said(context or ())),
+        chosen_context(context),
     )
     _check(keys, form, output)
     from app.quality.proof import queries as proof
@@ -95,19 +89,6 @@ def report_files(
     say(ngettext("%(num)d report written.", "%(num)d reports written.", many) % {"num": many})
     if failed:
         raise typer.Exit(1)
-
-
-def _said(pairs: Sequence[str]) -> dict[str, str]:
-    """The values by their fields, as they were typed."""
-    said: dict[str, str] = {}
-    for pair in pairs:
-        field, sign, value = (each.strip() for each in pair.partition("="))
-        if not sign or not value or said.setdefault(field, value) != value:
-            raise typer.BadParameter(
-                _("write it as order=A-4711, each field once; this is {text}").format(text=repr(pair[:60])),
-                param_hint="--context",
-            )
-    return said
 
 
 def _form_by(output: Path | None) -> Format:

@@ -6,9 +6,10 @@ from datetime import datetime
 from typing import Any, TextIO
 
 import msgspec
-from sqlalchemy import select, text
-from sqlalchemy.orm import Session
+from sqlalchemy import ColumnElement, select, text
+from sqlalchemy.orm import Session, aliased
 
+from app.core.context import Chosen, as_stored
 from app.core.decision.limits import Zone
 from app.core.decision.step import DECIMALS
 from app.core.period import ALWAYS, Period
@@ -56,16 +57,26 @@ MADE_OF = {"decided_deviation": "decided", "corrected_size": "deviation"}
 AT_ONCE = 2_000  # readings that are fetched at once
 
 
+def _here(entry: Entry, chosen: Chosen) -> list[ColumnElement[bool]]:
+    """Conditions on a reading that it is of this characteristic, and that its context has all of these values."""
+    here = [Reading.machine_id == entry.machine_id, Reading.characteristic_id == entry.characteristic_id]
+    if chosen:
+        said = aliased(ReadingContext)
+        those = select(said.sequence).where(
+            said.machine_id == entry.machine_id,
+            said.characteristic_id == entry.characteristic_id,
+            said.context.contains(as_stored(chosen)),
+        )
+        here.append(Reading.sequence.in_(those))
+    return here
+
+
 def rows(
-    session: Session,
-    entry: Entry,
-    *,
-    period: Period = ALWAYS,
-    last: int | None = None,
+    session: Session, entry: Entry, *, period: Period = ALWAYS, last: int | None = None, chosen: Chosen = ()
 ) -> Generator[dict[str, Any], None, None]:
-    """Readings in the order of their arrival: measured in the period, of the last `last`."""
+    """Readings in the order of their arrival: measured in the period, of the last `last` with this context."""
     hand = by_hand.latest_of_each()
-    here = (Reading.machine_id == entry.machine_id, Reading.characteristic_id == entry.characteristic_id)
+    here = _here(entry, chosen)
     query = (
         # Columns, not entities: a session keeps hold of those, and cannot let go of them between two fetches.
         select(

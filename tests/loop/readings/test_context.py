@@ -1,5 +1,7 @@
 """Readings told apart by their context: filters, charts, capability, comparison and replay count what belongs to an order or a nest."""
 
+import csv
+import io
 from typing import Any
 
 import numpy as np
@@ -9,6 +11,7 @@ from app.core.context import ContextField
 from app.loop.characteristics.queries import characteristic_named
 from app.loop.summaries.queries import chart_data, window_of
 from tests.conftest import Server
+from tests.forked import inband
 from tests.shop import Person, Shop
 
 COUNT = 600
@@ -61,6 +64,23 @@ def test_the_list_holds_those_of_an_order_and_a_nest(told: Told) -> None:
     everywhere = told.get("/readings", machine=told.shop.machine, limit=5, **{"context.order": "A-2"})["items"]
     assert [item["sequence"] for item in everywhere] == [401, 402, 403, 404, 405]
     assert told.get("/readings", characteristic=told.key, **{"context.order": "A-9"})["items"] == []
+
+
+def test_the_command_line_exports_those_of_an_order(told: Told) -> None:
+    def exported(*more: str) -> list[int]:
+        about = {"INBAND_DATABASE_URL": told.shop.server.database.dsn}
+        done = inband("export", "--characteristic", told.key, *more, **about)
+        assert done.returncode == 0, done.stderr
+        return [int(row["sequence"]) for row in csv.DictReader(io.StringIO(done.stdout))]
+
+    wanted = [n + 1 for n in range(COUNT) if told.order[n] == "A-1" and told.nest[n] == 2]
+    assert exported("--context", "order=A-1", "--context", "nest=2") == wanted
+    assert exported("--context", "order=A-0", "--last", "3") == [198, 199, 200], "counted among them"
+    refused = inband(
+        "export", "--characteristic", told.key, "--context", "order=A-1", "--format", "dfq", "-o", "x.dfq",
+        INBAND_DATABASE_URL=told.shop.server.database.dsn,
+    )  # fmt: skip
+    assert (refused.returncode, "AQDEF is written of all readings" in refused.stderr) == (2, True)
 
 
 def test_what_no_context_can_hold_is_refused(told: Told) -> None:
