@@ -208,6 +208,7 @@ class TestReportsInTheBackground:
             made = self.make(followed)
         assert (made["state"], made["problems"]) == ("done", 0)
 
+    @pytest.mark.long
     def test_are_read_there_and_by_the_other_where_the_standby_ends_the_query(
         self, followed: Shop, servers: Cluster
     ) -> None:

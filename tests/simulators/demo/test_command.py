@@ -13,19 +13,23 @@ from tests.forked import Forked
 from tests.waits import until
 
 
-def signed_in(port: int, log: Path) -> None:
-    """Sign in with what is printed, and see readings come, those of the bridged machine too."""
+def signed_in(port: int, log: Path, before: list[int]) -> list[int]:
+    """Sign in with what is printed, see readings come, those of the bridged machine too; how many there are of both."""
     found = re.search(r"engineer\s+(\S{14})", log.read_text())
     assert found, log.read_text()
     with httpx.Client(base_url=f"http://127.0.0.1:{port}", timeout=60, verify=TLS) as client:
         body = {"name": "engineer", "password": found[1]}
         assert client.post("/sign-in", data=body).is_redirect
 
-        def readings(characteristic: str) -> int:
-            answer = client.get("/api/v1/readings", params={"characteristic": characteristic, "limit": 20})
-            return len(answer.json()["items"]) if answer.is_success else 0
+        def newest(characteristic: str) -> int:
+            answer = client.get("/api/v1/readings", params={"characteristic": characteristic, "limit": 1000})
+            return max((each["sequence"] for each in answer.json()["items"]), default=0) if answer.is_success else 0
 
-        until(lambda: readings("plate-d30") == 20 and readings("spigot-d30"), 120)
+        def both() -> list[int]:
+            return [newest("plate-d30"), newest("spigot-d30")]
+
+        until(lambda: all(now > then for now, then in zip(both(), before, strict=True)), 120)
+        return both()
 
 
 @pytest.mark.parametrize("start", [Forked, pytest.param(begun, marks=pytest.mark.long)])
@@ -34,13 +38,13 @@ def test_it_prints_how_to_sign_in_runs_and_ends_in_order_and_the_second_start_go
 ) -> None:
     port, url = free_port(), new_database()
     command = ["demo", "--bridge", "--port", str(port), "--database-url", url, "--data-dir", str(tmp_path / "data")]
-    said = []
+    said, newest = [], [0, 0]
     for how in (signal.SIGTERM, signal.SIGINT):
         log = tmp_path / how.name
         process = start(command, log)
         try:
             wait_ready(f"http://127.0.0.1:{port}", process, log)
-            signed_in(port, log)
+            newest = signed_in(port, log, newest)
             process.send_signal(how)
             assert process.wait(60) in {0, 130}
         finally:
