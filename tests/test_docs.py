@@ -152,7 +152,7 @@ class TestReadme:
     def test_pictures_are_small_and_each_is_shown(self) -> None:
         text = "".join(path.read_text() for path in generate.documents())
         for picture in (HOUSE / "docs" / "images").iterdir():
-            assert 10_000 < picture.stat().st_size < 80_000
+            assert 5_000 < picture.stat().st_size < 80_000
             assert f"images/{picture.name})" in text, "python -m docs.pictures takes pictures that a document shows"
 
 
