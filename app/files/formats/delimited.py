@@ -24,6 +24,14 @@ ENCODINGS = (
     "cp1252",
     "iso-8859-2",
     "iso-8859-5",
+    "cp1253",
+    "cp1254",
+    "cp1257",
+    "cp866",
+    "cp932",
+    "gb18030",
+    "big5",
+    "cp949",
 )
 END = "END"  # alone in a row: so CALYPSO closes its tables
 SAMPLE = 64 * 1024

@@ -89,9 +89,13 @@ def test_a_header_that_names_no_length_is_refused_by_column(tmp_path: Path, unit
         good(listed, mapping={"measured": f"measured [{unit}]"})
 
 
-@pytest.mark.parametrize("encoding", ["utf-8", "utf-8-sig", "utf-16", "cp1250", "cp1251", "cp1252"])
+@pytest.mark.parametrize(
+    "encoding", ["utf-8", "utf-8-sig", "utf-16", "cp1250", "cp1251", "cp1252", "cp932", "cp949", "cp1253"]
+)
 def test_encodings(tmp_path: Path, encoding: str) -> None:
-    part = {"cp1251": "Шипка", "cp1252": "Welle Ø"}.get(encoding, "Žižek")
+    part = {"cp1251": "Шипка", "cp1252": "Welle Ø", "cp932": "部品", "cp949": "부품", "cp1253": "Άξονας"}.get(
+        encoding, "Žižek"
+    )
     path = write(tmp_path, f"measured,part\r\n39.998,{part}\r\n", encoding)
     named = encoding if encoding.startswith("cp") else None
     assert good(path, encoding=named) == [(39.998, part)]
