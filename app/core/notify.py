@@ -1,14 +1,15 @@
 """Notifications of active alarms, to whom and when: routes, quiet hours, repetition, escalation, one message in place of a flood.
 
 A route names the alarms it is for and steps of receivers. A step begins some minutes after the alarm, or with the step before
-where nobody of that can be reached now: failing, away, in quiet hours, or nobody on duty. A receiver gets at most one message in `GAP`, with everything that is due then;
-an alarm that stops a machine does not wait for it where the message before had none, so in `GAP` there are two at most.
+where nobody of that can be reached now: failing, away, in quiet hours, or nobody on duty. A receiver gets at most one message in
+`GAP`, with everything that is due then; an alarm that stops a machine does not wait for it where the message before had none, so in `GAP` there are two at most.
 """
 
 from collections import defaultdict
 from collections.abc import Container, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from datetime import date, datetime, time, timedelta, tzinfo
+from itertools import pairwise
 from types import MappingProxyType
 from typing import NamedTuple
 
@@ -73,6 +74,23 @@ class Group:
     def on_duty(self, local: datetime) -> tuple[int, ...]:
         """Those on duty at this moment, in the order of the rota; empty: nobody."""
         return tuple(dict.fromkeys(each for turn in self.turns if turn.holds(local) for each in turn.receivers))
+
+    def unattended(self, first: date, days: int) -> list[tuple[datetime, datetime]]:
+        """The times of so long from a day on in which nobody is on duty, by the plant's clock; none without a rota.
+
+        >>> early = Turn((1,), Hours(frozenset(range(1, 6)), time(6), time(14)))
+        >>> [f"{a:%a %H:%M} to {b:%a %H:%M}" for a, b in Group((1,), (early,)).unattended(date(2026, 11, 27), 3)]
+        ['Fri 00:00 to Fri 06:00', 'Fri 14:00 to Mon 00:00']
+        """
+        if not self.turns:
+            return []
+        clock = sorted({time.min} | {at for turn in self.turns for at in (turn.hours.begins, turn.hours.ends)})
+        begins = [datetime.combine(first + number * DAY, at) for number in range(days) for at in clock]
+        found: list[tuple[datetime, datetime]] = []
+        for begin, end in pairwise([*begins, datetime.combine(first + days * DAY, time.min)]):
+            if not self.on_duty(begin):
+                found.append((found.pop()[0] if found and found[-1][1] == begin else begin, end))
+        return found
 
 
 @dataclass(frozen=True, slots=True)
@@ -212,11 +230,15 @@ class Record:
 
 
 class Notice(NamedTuple):
-    """One message to be sent now: to whom, the alarms in it, oldest first, and those of them of which it is a reminder."""
+    """One message to be sent now: to whom, the alarms in it, oldest first, and those of them of which it is a reminder.
+
+    unattended: the groups in which those on duty should have been notified of them, and nobody is.
+    """
 
     receiver: int
     alarms: tuple[int, ...]
     again: frozenset[int]
+    unattended: frozenset[int] = frozenset()
 
 
 def notices(
@@ -237,23 +259,26 @@ def notices(
     due: dict[int, dict[int, bool]] = defaultdict(
         dict
     )  # by receiver and alarm: whether a message has to leave for it now
+    unattended = defaultdict[int, set[int]](set)
     for route in routes:
         if not route.is_open(local, days_off):
             continue
         for alarm in filter(route.concerns, alarms):
-            for number, begun in _begun(route, receivers, groups, alarm, now, local).items():
+            since, empty = _begun(route, receivers, groups, alarm, now, local)
+            for number, begun in since.items():
                 receiver = receivers[number]
                 at = _due_at(route, receiver, alarm, begun, record)
                 if at is not None and at <= now and receiver.listens(now, local, urgent=route.urgent):
                     leaves = (alarm.id, number) in record.alarms or at + route.digest <= now
                     due[number][alarm.id] = due[number].get(alarm.id, False) or leaves
+                    unattended[number] |= empty
     stopping = {alarm.id for alarm in alarms if alarm.tone == "stop"}
     found = []
     for number, of in sorted(due.items()):
         again = frozenset(each for each in of if (each, number) in record.alarms)
         stops = any(leaves and each in stopping and each not in again for each, leaves in of.items())
         if any(of.values()) and receivers[number].may_have_one(now, stops=stops):
-            found.append(Notice(number, tuple(sorted(of)), again))
+            found.append(Notice(number, tuple(sorted(of)), again, frozenset(unattended[number])))
     return found
 
 
@@ -264,12 +289,13 @@ def _begun(
     alarm: Raised,
     now: datetime,
     local: datetime,
-) -> dict[int, datetime]:
+) -> tuple[dict[int, datetime], set[int]]:
     """The receivers of the steps that have begun, and since when; a step after such as cannot be reached begins with theirs.
 
-    Of a group in which nobody is on duty there is nobody who can be reached.
+    Of a group in which nobody is on duty there is nobody who can be reached; the second are those groups.
     """
     begun: dict[int, datetime] = {}
+    empty: set[int] = set()
     unreached = False
     since = alarm.at
     for step in route.steps:
@@ -277,12 +303,13 @@ def _begun(
             since = alarm.at + step.after
             if since > now:
                 break
+        empty |= {number for number in step.on_duty if number in groups and not groups[number].on_duty(local)}
         known = [number for number in step.whom(groups, local) if number in receivers]
         for number in known:
             begun.setdefault(number, since)
         reachable = (receivers[number].listens(now, local, urgent=route.urgent) for number in known)
         unreached = all(receivers[number].failing or not there for number, there in zip(known, reachable, strict=True))
-    return begun
+    return begun, empty
 
 
 def _due_at(route: Route, receiver: Receiver, alarm: Raised, begun: datetime, record: Record) -> datetime | None:

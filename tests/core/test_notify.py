@@ -319,9 +319,12 @@ class TestGroups:
     EARLY, LATE = Hours(EVERY_DAY, time(6), time(14)), Hours(EVERY_DAY, time(14), time(22))
     SETTERS = Group((1, 2), (Turn((1,), EARLY), Turn((2,), LATE, first=date(2026, 11, 26))))
 
-    def named(self, now: datetime, *steps: Step, **of_first: object) -> list[int]:
+    def found(self, now: datetime, *steps: Step, **of_first: object) -> list[Notice]:
         receivers = {1: Receiver(1, **of_first), 2: Receiver(2), 3: Receiver(3)}  # type: ignore[arg-type]
-        return to(notices([Route(steps)], receivers, [alarm()], Record(), now, UTC, groups={7: self.SETTERS}))
+        return notices([Route(steps)], receivers, [alarm()], Record(), now, UTC, groups={7: self.SETTERS})
+
+    def named(self, now: datetime, *steps: Step, **of_first: object) -> list[int]:
+        return to(self.found(now, *steps, **of_first))
 
     def test_a_group_is_all_who_are_in_it(self) -> None:
         assert self.named(NOON, Step(timedelta(0), (3,), groups=(7,))) == [1, 2, 3]
@@ -335,6 +338,8 @@ class TestGroups:
         steps = Step(timedelta(0), (), on_duty=(7,)), Step(HOUR * 24, (3,))
         assert self.named(NOON, *steps) == [1]
         assert self.named(NOON + 10 * HOUR, *steps) == [3], "22:00: nobody is on duty"
+        (late,) = self.found(NOON + 10 * HOUR, *steps)
+        assert late.unattended == {7}, "the message says so"
         assert self.named(NOON, *steps, away_until=NOON + HOUR) == [3]
 
     def test_a_turn_is_kept_from_its_first_day_to_its_last_as_it_begins(self) -> None:

@@ -9,12 +9,13 @@ from pydantic_core import PydanticCustomError
 
 from app.core.notify import Group, Hours, Turn
 from app.language.i18n import _
-from app.language.times import local, plant_shifts
+from app.language.times import local, plant_shifts, plant_zone
 from app.loop.notifications.schemas import Clock, Day, Numbers
 from app.loop.notifications.tables import ReceiverGroup
 from app.web.fields import Body, Text200, answer_from
 
 EVERY_DAY = [1, 2, 3, 4, 5, 6, 7]
+LOOKED_AHEAD = 7  # days
 
 
 class TurnIn(Body):
@@ -92,13 +93,27 @@ class GroupOut(GroupIn):
         return answer_from(cls, row)
 
 
+class UnattendedOut(BaseModel):
+    """A time in which nobody of a group is on duty."""
+
+    begins: Annotated[datetime, Field(description="By the plant's clock.")]
+    ends: Annotated[datetime, Field(description="By the plant's clock.")]
+
+
 class DutyOut(BaseModel):
-    """The receivers of a group that are on duty now."""
+    """The receivers of a group that are on duty now, and when nobody is."""
 
     group: Annotated[int, Field(description="Number of the group.")]
     receivers: Annotated[list[int], Field(description="Their numbers; empty: nobody is on duty.")]
+    unattended: Annotated[
+        list[UnattendedOut],
+        Field(description="When nobody is on duty, today and in the six days after it; empty without a rota."),
+    ]
 
     @classmethod
     def of(cls, row: ReceiverGroup, now: datetime) -> Self:
         """Of a group of the table, at this moment."""
-        return cls(group=row.id, receivers=list(group_of(row).on_duty(local(now))))
+        group, zone = group_of(row), plant_zone()
+        times = group.unattended(local(now).date(), LOOKED_AHEAD)
+        unattended = [UnattendedOut(begins=a.replace(tzinfo=zone), ends=b.replace(tzinfo=zone)) for a, b in times]
+        return cls(group=row.id, receivers=list(group.on_duty(local(now))), unattended=unattended)

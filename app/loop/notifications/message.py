@@ -21,9 +21,17 @@ MOST_SHOWN = 3
 
 
 def of_alarms(
-    rows: Sequence[AlarmRow], count: int, again: Collection[int], address: str, reactions: Reactions
+    rows: Sequence[AlarmRow],
+    count: int,
+    again: Collection[int],
+    address: str,
+    reactions: Reactions,
+    unattended: Sequence[str] = (),
 ) -> Message:
-    """A message about active alarms. rows: the most urgent `MOST_IN_WORDS` of `count`; again: those it reminds of."""
+    """A message about active alarms. rows: the most urgent `MOST_IN_WORDS` of `count`; again: those it reminds of.
+
+    unattended: names of groups in which nobody is on duty who should have been notified.
+    """
     steps = {row.alarm.id: _steps(reactions, row) for row in rows}
     reminder = len(again) >= count
     if count == 1:
@@ -36,12 +44,15 @@ def of_alarms(
     parts = [_in_words(row, steps[row.alarm.id], address) for row in rows]
     if count > len(rows):
         parts.append(_("… and {n} more: {link}").format(n=count - len(rows), link=f"{address}/alarms"))
+    if unattended:
+        parts.append(_("Nobody is on duty now in: {groups}.").format(groups=", ".join(unattended)))
     parts.append(_("Acknowledge an alarm on its page; then nobody is reminded of it any more."))
     data = {
         "type": "alarms",
         "reminder": reminder,
         "subject": subject,
         "count": count,
+        "nobody_on_duty": list(unattended),
         "alarms": [_as_json(row, steps[row.alarm.id], address) for row in rows],
     }
     return Message(subject, "\n\n".join(parts) + "\n", data)

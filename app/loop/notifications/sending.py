@@ -284,7 +284,8 @@ def _alarm_job(
     session: Session, row: Receiver, notice: Notice, address: str, picture: Callable[[int], bytes | None]
 ) -> Job:
     listed: list[AlarmRow] = [alarm(session, number) for number in notice.alarms[: message.MOST_IN_WORDS]]
-    made = message.of_alarms(listed, len(notice.alarms), notice.again, address, Reactions(session))
+    groups = [each.name for each in queries.groups(session) if each.id in notice.unattended]
+    made = message.of_alarms(listed, len(notice.alarms), notice.again, address, Reactions(session), groups)
     if row.means == "mail":
         made = replace(made, picture=picture(notice.alarms[0]))
     return _job(session, row, "alarms", made, alarms=notice.alarms)

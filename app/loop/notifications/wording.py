@@ -8,6 +8,8 @@ from app.language.i18n import _
 from app.loop.notifications.group_schemas import DutyOut
 from app.loop.notifications.tables import ReceiverGroup
 
+MOST_TIMES = 4
+
 
 def means_word(means: str) -> str:
     """The name of a means."""
@@ -79,8 +81,18 @@ def _rota(row: ReceiverGroup, names: Mapping[int, str]) -> list[str]:
     return words
 
 
-def group_words(row: ReceiverGroup, names: Mapping[int, str], now: datetime) -> tuple[str, list[str], str]:
-    """The members of a group, its rota, and those on duty at this moment."""
+def group_words(row: ReceiverGroup, names: Mapping[int, str], now: datetime) -> tuple[str, list[str], str, str]:
+    """The members of a group, its rota, those on duty at this moment, and when nobody is in the week to come."""
     members = ", ".join(names.get(number, str(number)) for number in row.members)
-    duty = ", ".join(names.get(number, str(number)) for number in DutyOut.of(row, now).receivers)
-    return members, _rota(row, names), duty
+    duty = DutyOut.of(row, now)
+    on_duty = ", ".join(names.get(number, str(number)) for number in duty.receivers)
+    return members, _rota(row, names), on_duty, _unattended(duty)
+
+
+def _unattended(duty: DutyOut) -> str:
+    days = [_("Mon"), _("Tue"), _("Wed"), _("Thu"), _("Fri"), _("Sat"), _("Sun")]
+    times = [
+        "–".join(f"{days[at.weekday()]} {at:%H:%M}" for at in (each.begins, each.ends))
+        for each in duty.unattended[:MOST_TIMES]
+    ]
+    return ", ".join(times) + (" …" if len(duty.unattended) > MOST_TIMES else "")

@@ -12,6 +12,7 @@ from app.language.times import local
 from app.loop.notifications import sending
 from app.loop.notifications.calendar_queries import public_holidays
 from app.loop.notifications.group_schemas import GroupIn
+from app.loop.notifications.means import Job
 from tests.conftest import Server
 from tests.shop import Person, Shop, unique
 from tests.waits import until
@@ -34,21 +35,21 @@ def off_today(shop: Shop) -> str:
     return str(local(datetime.now(UTC)).date())
 
 
-Planned = Callable[[], set[int]]
+Planned = Callable[[], dict[int, Job]]
 
 
 @contextmanager
 def planning(shop: Shop, numbers: list[int]) -> Iterator[Planned]:
-    """To which of these receivers messages go now; until it ends the server itself sends nothing, and nothing of it is kept."""
+    """What goes to which of these receivers now; until it ends the server itself sends nothing, and nothing of it is kept."""
     with shop.server.database.begin() as session:
         until(lambda: session.scalar(sending._PLANNING))
 
-        def now() -> set[int]:
+        def now() -> dict[int, Job]:
             session.expire_all()
             with session.begin_nested() as tried:
-                found = {job.receiver for job in sending.plan(session, "https://inband.test", frozenset())}
+                found = {job.receiver: job for job in sending.plan(session, "https://inband.test", frozenset())}
                 tried.rollback()
-            return found & set(numbers)
+            return {number: job for number, job in found.items() if number in numbers}
 
         yield now
         session.rollback()
@@ -64,7 +65,8 @@ class TestByRest:
         ]
         made = shop.call("POST", "/notifications/groups", 201, name="Setters", members=[anna, ben], rota=rota)
         path = f"/notifications/groups/{made['id']}"
-        assert shop.call("GET", f"{path}/on-duty") == {"group": made["id"], "receivers": [ben]}
+        duty = {"group": made["id"], "receivers": [ben], "unattended": []}
+        assert shop.call("GET", f"{path}/on-duty") == duty
         shop.call("PUT", path, name="Setters", members=[anna, ben])
         assert shop.call("GET", f"{path}/on-duty")["receivers"] == []
         entries = shop.call("GET", f"/audit?subject=receiver-group/{made['id']}")["items"]
@@ -142,9 +144,13 @@ class TestSending:
         shop.call("POST", "/notifications/routes", 201, name="Duty", machines=[shop.machine], steps=steps)
         with planning(shop, numbers) as planned:
             shop.read(350)
-            assert planned() == {ben}
-            shop.call("PUT", f"/notifications/groups/{group}", **body)
-            assert planned() == {eve}, "nobody is on duty"
+            assert planned().keys() == {ben}
+            tomorrow = {"receivers": [ben], "first": str(local(datetime.now(UTC)).date() + timedelta(1))}
+            shop.call("PUT", f"/notifications/groups/{group}", **body, rota=[tomorrow])
+            assert planned().keys() == {eve}, "nobody is on duty"
+            made = planned()[eve].message
+            assert "Nobody is on duty now in: Setters." in made.text
+            assert made.data["nobody_on_duty"] == ["Setters"]
 
     def test_a_route_is_closed_on_days_off(self, shop: Shop) -> None:
         always, working = numbers = [receiver(shop, name) for name in ("Always", "Working")]
@@ -156,9 +162,9 @@ class TestSending:
         with planning(shop, numbers) as planned:
             shop.call("PUT", "/notifications/calendar", days=days)
             shop.read(350)
-            assert planned() == {always}
+            assert planned().keys() == {always}
             shop.call("PUT", "/notifications/calendar", days=[])
-            assert planned() == {always, working}
+            assert planned().keys() == {always, working}
 
 
 class TestPages:
