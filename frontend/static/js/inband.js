@@ -43,6 +43,15 @@ document.addEventListener("submit", (event) => {
   if (event.target.dataset.sent) event.preventDefault();
   event.target.dataset.sent = "yes";
 });
+// An address says what was asked for, and no more (app/web/page_queries.py has the forms in which an empty field says something).
+document.addEventListener("formdata", ({ target: form, formData }) => {
+  if (form.method !== "get" || "keepsEmpty" in form.dataset) return;
+  for (const name of new Set(formData.keys())) {
+    const said = formData.getAll(name).filter((value) => value !== "");
+    formData.delete(name);
+    for (const value of said) formData.append(name, value);
+  }
+});
 // Going back to a page must not leave its forms dead.
 window.addEventListener("pageshow", () => document.querySelectorAll("form[data-sent]").forEach((form) => delete form.dataset.sent));
 

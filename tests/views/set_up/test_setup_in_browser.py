@@ -138,3 +138,12 @@ def test_nothing_hangs_over_the_edge(signed_in: Page, shop: Shop, width: int, he
     ):
         page.goto(path)
         assert page.evaluate("document.documentElement.scrollWidth") <= width, path
+
+
+def test_an_address_has_no_field_that_was_left_empty(signed_in: Page) -> None:
+    page = signed_in
+    page.goto("/setup/audit")
+    page.fill("[name=actor]", "engineer")
+    page.press("[name=actor]", "Enter")
+    page.wait_for_url("**/setup/audit?*")
+    assert page.url.partition("?")[2] == "actor=engineer"
