@@ -349,7 +349,7 @@ def export_file(
         database.begin() as session,
     ):
         entry = queries.entry_named(session, characteristic)
-        ends = exporting.Ends()
+        ends, said = exporting.Ends(), {"context": dict(chosen)} if chosen else {}
         exported = ends.of(exporting.rows(session, entry, period=period, last=last, chosen=chosen))
         with _output(output) as target, in_zone(zone):
             count = (exporting.write_ndjson if lines_wanted else exporting.write_csv)(exported, target)
@@ -358,7 +358,7 @@ def export_file(
             f"command line ({getpass.getuser()})",
             "readings exported",
             f"characteristic/{characteristic}",
-            after={"readings": count, "format": "ndjson" if lines_wanted else "csv", "context": dict(chosen)},
+            after={"readings": count, "format": "ndjson" if lines_wanted else "csv"} | said,
         )
     text = ngettext("%(num)d reading written", "%(num)d readings written", count) % {"num": count}
     with in_zone(zone):

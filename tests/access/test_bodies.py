@@ -307,6 +307,8 @@ VIEWERS_MAY = {
     "reports",
     "measuring-plans",
     "me",
+    "me/browser",
+    "me/browser/messages",
     "count-charts",
 }
 

@@ -117,7 +117,7 @@ def showcase(stage: Stage | None = None) -> Starlette:
     """The application: `/` has everything, `/chart` only the zone chart."""
     stage = stage or Stage()
     text = Path(__file__).with_name("showcase.html").read_text()
-    person = SimpleNamespace(name="Ana Petrović", role="operator")
+    person = SimpleNamespace(name="Ana Petrović", role="operator", person_id=None)
 
     def home(request: Request) -> Response:
         request.state.person, request.state.csrf, request.state.waiting = person, "token", {"to_do": 2}

@@ -889,10 +889,10 @@ def test_every_part_of_the_simulated_machine_arrives_once(tmp_path: Path) -> Non
 def test_a_stop_that_could_not_be_written_is_found_before(tmp_path: Path) -> None:
     place = tmp_path / "andon" / "stop.json"
     link = Folder(machine(tmp_path, decisions=str(place)))
-    [wrong] = asyncio.run(link.try_out())
+    [wrong] = run(link.try_out())
     assert f"cannot be written to {place}" in wrong
     place.parent.mkdir()
-    assert asyncio.run(link.try_out()) == []
+    assert run(link.try_out()) == []
     assert list(place.parent.iterdir()) == []
 
 

@@ -24,7 +24,7 @@ SETTINGS = {"zero_range": 0.0002, "averaging_limit": 0.005, "weighting_factor": 
     ],
 )
 def test_parts_left(forecast: Forecast, said: str) -> None:
-    assert parts_left(forecast).replace("\xa0", " ") == said
+    assert parts_left(forecast).replace("\xa0", " ").replace("\u202f", " ") == said
 
 
 def test_the_interval_says_how_often_it_held_and_whose_width_it_has() -> None:
