@@ -1,5 +1,5 @@
 # make run     the demonstration plant at http://127.0.0.1:8000; ARGS="--past 42" for six weeks behind it
-# make test    lint, then the tests on a real PostgreSQL and in a real browser, in another order each time; ARGS="-k name" for
+# make test    lint, and the tests on a real PostgreSQL and in a real browser, in another order each time; ARGS="-k name" for
 #              some of them, ARGS="--randomly-seed=N" for the order of an earlier run
 # make test-long  what is slow by nature: campaigns of faults, failover, every page in every size, chance with fresh seeds; and the
 #              tests of make test with servers that have one connection to the database for all their pages
@@ -30,13 +30,14 @@ PYTHON ?= $(shell for each in python3 python3.14 python3.13 python3.12 python3.1
 run: $(VENV)/installed
 	@exec $(BIN)/inband demo $(ARGS)
 
-# Once in a clone: while lint looks at types on one core, the other one compiles what all workers of the tests would at once.
+# Lint runs beside the tests; what it finds is printed at once, and fails the run at its end. Once in a clone: what all workers of
+# the tests would compile at the same time is compiled before.
 test: $(VENV)/browser
-	@$(MAKE) -s lint & lint=$$!; \
+	@$(MAKE) -s lint & lint=$$!; tests=0; \
 	test -e $(VENV)/prepared.txt \
 		|| { $(BIN)/python -m tests.preloaded && $(BIN)/pytest -qq --collect-only; } > $(VENV)/prepared.txt 2>&1 || true; \
-	wait $$lint
-	@$(BIN)/pytest -n auto --dist worksteal $(ARGS)
+	$(BIN)/pytest -n auto --dist worksteal $(ARGS) || tests=$$?; \
+	wait $$lint; exit $$tests
 
 test-long: $(VENV)/browser
 	@$(BIN)/pytest -n auto --dist worksteal --long $(ARGS)
