@@ -5,8 +5,10 @@ import json
 import re
 import threading
 from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
 from typing import Any, NamedTuple
 
+import httpx
 import pytest
 from fastapi.routing import APIRoute
 from starlette.types import Message, Receive, Scope, Send
@@ -22,6 +24,7 @@ from tests.conftest import NewDatabase, drop_database
 from tests.in_process import Direct, InProcess, in_process
 from tests.loops import run
 from tests.shop import Person, Shop
+from tests.waits import until
 
 JSON, FORM, FILE = "application/json", "application/x-www-form-urlencoded", "multipart/form-data; boundary=b"
 KINDS = (JSON, FORM, FILE)
@@ -239,6 +242,34 @@ def test_a_large_body_is_read_beside_the_event_loop(
     small, large = threads
     assert small is loop
     assert large is not loop
+
+
+def test_large_bodies_of_one_caller_are_read_one_after_the_other(
+    server: InProcess, shop: Shop, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Twenty threads that read at once left the event loop a twentieth of its time. Nobody else waits for them."""
+    read, reading, most, go_on = json_bodies.read_json, 0, 0, threading.Event()
+
+    def slowly(body: bytes, content_type: str | None) -> Any:
+        nonlocal reading, most
+        if b"slow" in body:
+            reading += 1
+            most = max(most, reading)
+            assert go_on.wait(60)
+            reading -= 1
+        return read(body, content_type)
+
+    def note(client: httpx.Client, text: str) -> int:
+        return client.post("/api/v1/notes", json={"text": text + " " * 20_000, "machine": shop.machine}).status_code
+
+    monkeypatch.setattr(json_bodies, "read_json", slowly)
+    with ThreadPoolExecutor(4) as callers:
+        flood = [callers.submit(note, shop.admin, "slow") for _ in range(4)]
+        until(lambda: reading > 0)
+        assert note(server.client(server.key("engineer")), "of another") == 201
+        go_on.set()
+        assert [each.result() for each in flood] == [201] * 4
+    assert most == 1
 
 
 def test_a_large_body_makes_what_a_small_one_would(server: InProcess, shop: Shop) -> None:
