@@ -22,7 +22,8 @@ unexport PYTHONDONTWRITEBYTECODE
 
 VENV := .venv
 BIN := $(VENV)/bin
-PIP := $(BIN)/python -m pip install -qq --disable-pip-version-check --no-input --root-user-action ignore
+# To compile all libraries takes as long as to install them; Python compiles those that are used when they are.
+PIP := $(BIN)/python -m pip install -qq --no-compile --disable-pip-version-check --no-input --root-user-action ignore
 # The first Python that is new enough; `make PYTHON=...` knows better.
 PYTHON ?= $(shell for each in python3 python3.14 python3.13 python3.12 python3.11; do \
 	$$each -c 'import sys; sys.exit(sys.version_info < (3, 11))' 2>/dev/null && { echo $$each; break; }; done)
