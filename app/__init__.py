@@ -59,7 +59,7 @@ only through each other's queries and actions. frontend/ and migrations/ lie bes
         programs         program text of the controls: read, written
         timeline         events along time or readings on every chart: alarms, tool changes, calibrations, versions
         notes            what a person writes down at a machine or a characteristic, at a moment
-        maintenance      times in which nobody is notified of the alarms of a machine, or of any
+        maintenance      times in which no notifications of a machine's alarms, or of all, are sent
         alarms           kinds of alarms, raised once
         readings         the door: probe readings come in, are decided, stored and answered together
         expansion        thermal expansion of characteristics, sizes at 20 °C beside the measured ones

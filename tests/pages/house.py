@@ -190,6 +190,7 @@ PAGES = {
     "/maintenance": ["/maintenance", "/maintenance?machine={machine}"],
     "/maintenance/new": ["/maintenance/new?machine={machine}"],
     "/maintenance/{number}/end": ["/maintenance/{maintenance}/end"],
+    "/maintenance/{number}/extend": ["/maintenance/{maintenance}/extend"],
     "/setup/notifications": ["/setup/notifications"],
     "/setup/notifications/days-off": ["/setup/notifications/days-off"],
     "/setup/notifications/groups/new": ["/setup/notifications/groups/new"],

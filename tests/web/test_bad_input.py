@@ -122,6 +122,10 @@ BODIES: dict[str, dict[str, Any]] = {
         "reason": "Spindle bearing replaced",
         "stopping_anyway": False,
     },
+    "POST /api/v1/maintenance/{maintenance}/extend": {
+        "ends": f"{datetime.now(UTC) + timedelta(days=2):%Y-%m-%dT%H:%M:%SZ}",
+        "reason": "The spare part comes tomorrow",
+    },
     "POST /api/v1/maintenance/{maintenance}/end": WHY,
     "POST /api/v1/notifications/receivers": RECEIVER | {"means": "webhook"},
     "PATCH /api/v1/notifications/receivers/{receiver}": RECEIVER | {"address": "anna@example.com", "events": []},

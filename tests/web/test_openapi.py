@@ -420,6 +420,7 @@ FORMS: dict[str, tuple[str, ...] | None] = {
     "/notes/new": ("write_note",),
     "/maintenance/new": ("enter_maintenance",),
     "/maintenance/{number}/end": ("end_maintenance",),
+    "/maintenance/{number}/extend": ("extend_maintenance",),
     "/notes/{number}/withdraw": ("withdraw_note",),
     "/proposals/{number}": ("approve_proposal", "reject_proposal", "withdraw_proposal"),
     "/reports": ("ask_for_reports",),

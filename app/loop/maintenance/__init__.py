@@ -1,1 +1,1 @@
-"""Maintenance: times in which people are not notified of the alarms of a machine, or of any. The alarms are raised as ever."""
+"""Maintenance: times in which no notifications of the alarms of a machine, or of all, are sent. The alarms are raised as ever."""

@@ -9,7 +9,7 @@ from app.access.deps import AnyCaller, Operator
 from app.loop.machines.queries import only_machine
 from app.loop.maintenance import actions, queries
 from app.loop.maintenance.schemas import MaintenanceIn, MaintenanceOut
-from app.loop.maintenance.verbs import END, OfMaintenance
+from app.loop.maintenance.verbs import END, EXTEND, OfMaintenance
 from app.web.api import Before, Limit, MachineFilter, api_router, problems
 from app.web.deps import SessionDep
 from app.web.fields import LARGEST_ID, Page, page_of
@@ -38,10 +38,10 @@ def list_maintenance(
 def enter_maintenance(
     session: SessionDep, caller: Operator, given: MaintenanceIn, response: Response
 ) -> MaintenanceOut:
-    """Put a machine, or all, under maintenance: meanwhile nobody is notified of their alarms, which are raised as ever.
+    """Put a machine, or all, under maintenance: no notifications of their alarms are sent meanwhile. Alarms are raised as ever.
 
-    An operator enters it for one machine, over within 24 hours, with `stopping_anyway`. 409 where the same machine is under
-    maintenance at a moment of it already.
+    An operator enters it for one machine, over within 24 hours, with `stopping_anyway`. 409 where other maintenance of the same
+    machine overlaps with it. The same from the same sender within 30 s is one, and answered as the first.
     """
     row = actions.enter_maintenance(session, given, caller)
     response.headers["Location"] = f"/api/v1/maintenance/{row.maintenance.id}"
@@ -61,11 +61,12 @@ def _maintenance(session: SessionDep, caller: Operator, maintenance: Number) -> 
     return OfMaintenance(session, maintenance, caller)
 
 
-draw(
-    router,
-    "/maintenance/{maintenance}/end",
-    END,
-    _maintenance,
-    lambda _on, row: MaintenanceOut.of(row, datetime.now(UTC)),
-    MaintenanceOut,
-)
+for verb in (EXTEND, END):
+    draw(
+        router,
+        f"/maintenance/{{maintenance}}/{verb.name}",
+        verb,
+        _maintenance,
+        lambda _on, row: MaintenanceOut.of(row, datetime.now(UTC)),
+        MaintenanceOut,
+    )

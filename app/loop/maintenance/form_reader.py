@@ -1,4 +1,4 @@
-"""The form of maintenance, read."""
+"""The forms of maintenance, read."""
 
 from collections.abc import Mapping
 from datetime import datetime
@@ -8,7 +8,7 @@ from app.errors import Invalid
 from app.files.formats import cell_values
 from app.language.i18n import _
 from app.language.times import plant_zone
-from app.loop.maintenance.schemas import MaintenanceIn
+from app.loop.maintenance.schemas import ExtendIn, MaintenanceIn
 from app.web.forms import typed
 
 
@@ -19,6 +19,11 @@ def as_typed(form: Mapping[str, str]) -> MaintenanceIn:
     """
     times = {"begins": _time(form, "begins", 0), "ends": _time(form, "ends", 1)}
     return typed(MaintenanceIn, form, stopping_anyway=form.get("stopping_anyway") == "true", **times)
+
+
+def end_as_typed(form: Mapping[str, str]) -> ExtendIn:
+    """A later end as the person typed it, by the plant's clock. Raises `Invalid`."""
+    return typed(ExtendIn, form, ends=_time(form, "ends", 1))
 
 
 def _time(form: Mapping[str, str], name: str, fold: Literal[0, 1]) -> datetime | None:

@@ -1,4 +1,4 @@
-"""Pages: maintenance that runs, is planned or over; the form that enters it, and the question that ends it."""
+"""Pages: maintenance that runs, is planned or over; the forms that enter and extend it, and the question that ends it."""
 
 from collections.abc import Mapping
 from datetime import UTC, datetime
@@ -14,7 +14,8 @@ from app.errors import Conflict, InbandError, Invalid, NotAllowed
 from app.language.i18n import _
 from app.loop.machines import queries as machines
 from app.loop.maintenance import actions, queries, verbs
-from app.loop.maintenance.form_reader import as_typed
+from app.loop.maintenance.form_reader import as_typed, end_as_typed
+from app.loop.maintenance.queries import MaintenanceRow
 from app.loop.maintenance.verbs import END, OfMaintenance
 from app.web.deps import Before, FormDep, Number, SessionDep, Word
 from app.web.forms import by_field
@@ -52,7 +53,11 @@ def maintenance_page(
             (END,),
             done,
             n,
-            {"entered": _("Maintenance {n} is entered."), "late": _("Maintenance {n} is over already.")},
+            {
+                "entered": _("Maintenance {n} is entered."),
+                "extended": _("Maintenance {n} is extended."),
+                "late": _("Maintenance {n} is over already."),
+            },
         )
         if done
         else None,
@@ -97,6 +102,39 @@ def _of_number(session: SessionDep, caller: Operator, number: int) -> OfMaintena
     return OfMaintenance(session, number, caller)
 
 
+@router.get("/maintenance/{number}/extend")
+def extend_form(request: Request, session: SessionDep, _caller: Operator, number: int) -> Response:
+    """The form that moves its end; what is over leads back to the list."""
+    row = queries.maintenance(session, number)
+    if row.state(datetime.now(UTC)) in {"over", "cancelled"}:
+        return RedirectResponse(address("/maintenance", done="late", n=number), 303)
+    return _extend_form(request, row, {})
+
+
+def _extend_form(
+    request: Request, row: MaintenanceRow, form: Mapping[str, str], error: InbandError | None = None
+) -> Response:
+    return page(
+        request,
+        "maintenance/extend.html",
+        status=error.status if error else 200,
+        row=row,
+        form=form,
+        errors=by_field(error) if error else {},
+        problem=error if error and not error.errors else None,
+    )
+
+
+@router.post("/maintenance/{number}/extend")
+def extend(request: Request, session: SessionDep, caller: Operator, number: int, form: FormDep) -> Response:
+    """Move its end; times are by the plant's clock."""
+    try:
+        actions.extend(session, number, end_as_typed(form), caller)
+    except (Invalid, Conflict, NotAllowed) as error:
+        return _extend_form(request, queries.maintenance(session, number), form, error)
+    return RedirectResponse(address("/maintenance", done="extended", n=number), 303)
+
+
 def _around(on: OfMaintenance, _verb: Verb[OfMaintenance, Any]) -> dict[str, Any]:
     row = on.row
     return {
@@ -107,7 +145,7 @@ def _around(on: OfMaintenance, _verb: Verb[OfMaintenance, Any]) -> dict[str, Any
 
 
 def _ended(_request: Request, on: OfMaintenance, _verb: Verb[OfMaintenance, Any], outcome: Outcome) -> Response:
-    """Sent twice, or after somebody else, it changes nothing and says so."""
+    """Sent twice, or after another person, it changes nothing and says so."""
     done = "late" if outcome.kind == "late" else verbs.END.name
     return RedirectResponse(address("/maintenance", done=done, n=on.number), 303)
 

@@ -43,7 +43,7 @@ _ROWS = select(Maintenance, Machine).outerjoin(Machine, Machine.id == Maintenanc
 
 
 def hold_all(session: Session) -> None:
-    """Let nobody else enter or end maintenance until the transaction ends."""
+    """Wait until no other request enters, extends or ends maintenance, and keep it so until the transaction ends."""
     session.execute(_HOLD)
 
 

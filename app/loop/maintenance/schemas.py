@@ -8,9 +8,7 @@ from pydantic import BaseModel, Field
 from app.loop.maintenance.queries import MaintenanceRow, State
 from app.web.fields import Body, Moment, Reason, Slug, answer_from
 
-StoppingAnyway = Annotated[
-    bool, Field(description="Notifications of alarms that stop a machine are sent all the same.")
-]
+StoppingAnyway = Annotated[bool, Field(description="Notifications of alarms that stop a machine are still sent.")]
 
 
 class MaintenanceIn(Body):
@@ -29,20 +27,27 @@ class EndIn(Body):
     reason: Reason | None = None
 
 
+class ExtendIn(Body):
+    """A later end of maintenance; a reason may be named."""
+
+    ends: Annotated[Moment, Field(description="The new end, later than the present one.")]
+    reason: Reason | None = None
+
+
 class MaintenanceOut(BaseModel):
     """Maintenance of a machine, or of all."""
 
     id: int
     machine: Annotated[str | None, Field(description="Key of the machine; null: all machines.")]
     begins: Annotated[datetime, Field(description="From then on notifications are withheld.")]
-    ends: Annotated[datetime, Field(description="When it is over, unless somebody ends it before.")]
+    ends: Annotated[datetime, Field(description="When it is over, if it is not ended earlier.")]
     reason: str
     stopping_anyway: StoppingAnyway
     state: Annotated[State, Field(description="`cancelled`: ended before it began.")]
     entered_at: Annotated[datetime, Field(description="When it was entered.")]
     entered_by: Annotated[str, Field(description="Who entered it.")]
-    ended_at: Annotated[datetime | None, Field(description="When somebody ended it; null: nobody has.")]
-    ended_by: Annotated[str | None, Field(description="Who ended it.")]
+    ended_at: Annotated[datetime | None, Field(description="When it was ended by hand; null: it was not.")]
+    ended_by: Annotated[str | None, Field(description="Who ended it by hand.")]
 
     @classmethod
     def of(cls, row: MaintenanceRow, now: datetime) -> Self:

@@ -11,9 +11,9 @@ MAINTENANCE_NUMBERS = Sequence("maintenance_id", metadata=Base.metadata)
 
 
 class Maintenance(Base):
-    """Maintenance of a machine; without one, of all machines. It is over at `ends`, or when somebody has ended it before.
+    """Maintenance of a machine; without one, of all machines. It is over at `ends`, or earlier if it is ended by hand.
 
-    A trigger keeps it as it was entered, and once it is ended, who has ended it.
+    A trigger keeps it as it was entered, but for its end, which may be moved; and once it is ended, all of it.
     """
 
     __tablename__ = "maintenance"

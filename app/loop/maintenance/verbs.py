@@ -10,8 +10,8 @@ from app.access.callers import Caller
 from app.language.i18n import _
 from app.loop.maintenance import actions, queries
 from app.loop.maintenance.queries import MaintenanceRow
-from app.loop.maintenance.schemas import EndIn
-from app.web.verb import Verb
+from app.loop.maintenance.schemas import EndIn, ExtendIn
+from app.web.verb import Act, Verb
 
 
 @dataclass(frozen=True)
@@ -34,10 +34,16 @@ class OfMaintenance:
 
 
 def end_maintenance(on: OfMaintenance, given: EndIn) -> MaintenanceRow:
-    """End it now, or cancel it before it begins. Alarms that are still active are announced then."""
+    """End it now, or cancel it before it begins. Alarms that are still active are then announced."""
     return actions.end(on.session, on.number, given.reason, on.caller)
 
 
+def extend_maintenance(on: OfMaintenance, given: ExtendIn) -> MaintenanceRow:
+    """Move its end to a later time. An operator: of one machine, over within 24 hours, with `stopping_anyway`."""
+    return actions.extend(on.session, on.number, given, on.caller)
+
+
+EXTEND: Act[OfMaintenance, ExtendIn] = Act(name="extend", body=ExtendIn, act=extend_maintenance)
 END: Verb[OfMaintenance, EndIn] = Verb(
     name="end",
     body=EndIn,
@@ -46,6 +52,8 @@ END: Verb[OfMaintenance, EndIn] = Verb(
     own=lambda on: on.row.maintenance.ended_by == on.caller.name,
     word=lambda: _("End maintenance"),
     title=lambda _on: _("End the maintenance of {name}?"),
-    follows=lambda _on: [_("People are notified again, of alarms that came meanwhile and are still active too.")],
+    follows=lambda _on: [
+        _("People are notified again, also of alarms that were raised meanwhile and are still active.")
+    ],
     said=lambda: _("Maintenance {n} is ended. People are notified again."),
 )

@@ -1,6 +1,7 @@
 """One machine as its station shows it. Never writes."""
 
 from collections.abc import Sequence
+from datetime import UTC, datetime
 from typing import NamedTuple
 
 from sqlalchemy.orm import Session
@@ -10,6 +11,7 @@ from app.errors import NotFound
 from app.language.i18n import _
 from app.loop.alarm_response import queries as alarms
 from app.loop.alarm_response.queries import AlarmRow
+from app.loop.maintenance.queries import MaintenanceRow, running
 from app.loop.tables.machines import Machine
 from app.views.approvals import queries as approvals
 from app.views.approvals.queries import Group, Waiting
@@ -26,7 +28,7 @@ class Station(NamedTuple):
 
     tools: the tools that its characteristics are cut with. waiting: corrections to decide about that no active alarm holds, and those to enter
     at the control, the oldest few; more: those behind them; together: of the tools of which several await approval, what approving all of
-    them comes to.
+    them comes to. maintenance: what runs, in which no notifications are sent.
     """
 
     machine: Machine
@@ -38,6 +40,7 @@ class Station(NamedTuple):
     waiting: Sequence[Waiting]
     more: int
     together: Sequence[Group]
+    maintenance: Sequence[MaintenanceRow]
 
 
 def station(session: Session, machine: str) -> Station:
@@ -60,6 +63,7 @@ def station(session: Session, machine: str) -> Station:
         waiting,
         len(deciding) + number_entering - len(waiting),
         [tool for tool in tools if len(tool.approvable) > 1],
+        running(session, datetime.now(UTC), group.machine.id),
     )
 
 

@@ -8,8 +8,10 @@ from sqlalchemy.orm import Session
 
 from app.core.state import CharacteristicState
 from app.language.i18n import _
+from app.language.numbers import as_read
 from app.loop.alarm_response import queries as responses
 from app.loop.alarm_response import wording as alarm_wording
+from app.loop.maintenance.queries import MaintenanceRow, running
 from app.views.characteristic import state_queries as plant
 from app.views.characteristic.state_queries import Group
 from app.views.characteristic.wording import state_word
@@ -21,7 +23,7 @@ MOST_MACHINES = 24
 
 
 class Tile(NamedTuple):
-    """A machine: its most urgent state in a word, and the parts of the shift."""
+    """A machine: its most urgent state in a word, the parts of the shift, and its maintenance with its end and who entered it."""
 
     name: str
     word: str
@@ -29,6 +31,7 @@ class Tile(NamedTuple):
     icon: str
     parts: int
     outside: int
+    maintenance: str = ""
 
 
 class WallAlarm(NamedTuple):
@@ -60,12 +63,18 @@ def wall(session: Session, now: datetime | None = None) -> Wall:
     period = period_at(now, now)
     assert period.start is not None
     made = made_in(session, period)
-    tiles = []
+    tiles, maintained = [], running(session, now)
     for group in plant.plant(session, trends=False):
         state, word = _state(group, now)
         of_shift = made.get(group.machine.id)
         parts, outside = (of_shift.parts, of_shift.outside) if of_shift else (0, 0)
-        tiles.append(Tile(group.machine.name, word, tone_of(state), icon_of(state), parts, outside))
+        under = [row for row in maintained if row.machine is None or row.machine.id == group.machine.id][:1]
+        tiles.append(
+            Tile(
+                group.machine.name, word, tone_of(state), icon_of(state), parts, outside,
+                "".join(_under(row, now) for row in under),
+            )
+        )  # fmt: skip
     if len(tiles) > MOST_MACHINES:
         tiles.sort(key=lambda tile: URGENCY.index(tile.tone))
     rows = responses.alarms(session, state="active", limit=MOST_ALARMS, by_urgency=True)
@@ -88,6 +97,12 @@ def wall(session: Session, now: datetime | None = None) -> Wall:
         sum(each.parts for each in made.values()),
         sum(each.outside for each in made.values()),
     )
+
+
+def _under(row: MaintenanceRow, now: datetime) -> str:
+    until = row.maintenance.over_at
+    style = "time" if as_read(until, "date") == as_read(now, "date") else "minutes"
+    return _("Maintenance until {at}, {name}").format(at=as_read(until, style), name=row.maintenance.entered_by)
 
 
 def _state(group: Group, now: datetime) -> tuple[str, str]:

@@ -73,6 +73,90 @@ class TestEntering:
         assert [each["state"] for each in listed(shop, ahead=True)] == ["running"]
 
 
+class TestTwice:
+    """A button that is pressed twice, or an answer that was lost: the second is the first."""
+
+    @pytest.mark.parametrize("times", [{}, {"begins": 5}, {"begins": 5, "ends": 7}, {"ends": 7}])
+    def test_the_same_is_entered_once(self, shop: Shop, times: dict[str, float]) -> None:
+        sent: dict[str, Any] = {name: ahead(hours) for name, hours in times.items()}
+        first = enter(shop, **sent)
+        assert enter(shop, **sent) == first
+        assert len(listed(shop)) == 1
+        audit = shop.call("GET", f"/audit?subject=maintenance/{first['id']}")["items"]
+        assert [each["action"] for each in audit] == ["maintenance entered"]
+
+    @pytest.mark.parametrize("other", [{"reason": "Oil"}, {"stopping_anyway": False}, {"begins": 1}, {"ends": 2}])
+    def test_what_differs_is_refused(self, shop: Shop, other: dict[str, Any]) -> None:
+        enter(shop)
+        enter(
+            shop, 409, **{name: ahead(value) if name in {"begins", "ends"} else value for name, value in other.items()}
+        )
+
+    def test_of_another_person_it_is_refused(self, shop: Shop, server: Server) -> None:
+        enter(shop)
+        shown = Person(server, "operator").send(
+            "/maintenance/new", 409, machine=shop.machine, stopping_anyway="true", **WHY
+        )
+        assert "overlaps with it" in shown
+
+    def test_on_the_page_too(self, shop: Shop, server: Server) -> None:
+        person = Person(server, "operator")
+        for _press in range(2):
+            shown = person.send("/maintenance/new", machine=shop.machine, reason="Oil", stopping_anyway="true")
+            assert f"Maintenance {listed(shop)[0]['id']} is entered." in shown
+        assert len(listed(shop)) == 1
+
+
+class TestExtending:
+    def extend(self, shop: Shop, number: int, status: int, **sent: Any) -> Any:
+        return shop.call("POST", f"/maintenance/{number}/extend", status, **sent)
+
+    def test_its_end_is_moved_and_on_record(self, shop: Shop) -> None:
+        made, ends = enter(shop), ahead(20)
+        moved = self.extend(shop, made["id"], 200, ends=ends, reason="The bearing comes at noon")
+        assert datetime.fromisoformat(moved["ends"]) == datetime.fromisoformat(ends)
+        assert moved["state"] == "running"
+        assert self.extend(shop, made["id"], 200, ends=ends) == moved, "sent twice"
+        last, entered = shop.call("GET", f"/audit?subject=maintenance/{made['id']}")["items"]
+        assert (last["action"], last["why"]) == ("maintenance extended", "The bearing comes at noon")
+        assert last["before"] == entered["after"]
+        assert datetime.fromisoformat(last["after"]["ends"]) == datetime.fromisoformat(ends)
+
+    @pytest.mark.parametrize(
+        ("hours", "words"), [(-1, "must come after"), (7, "must come after"), (63 * 24, "within 62 days")]
+    )
+    def test_an_end_that_cannot_be_is_refused(self, shop: Shop, hours: float, words: str) -> None:
+        made = enter(shop)
+        (error,) = self.extend(shop, made["id"], 422, ends=ahead(hours))["errors"]
+        assert error["field"] == "ends"
+        assert words in error["message"]
+        assert listed(shop)[0]["ends"] == made["ends"]
+
+    def test_it_does_not_run_into_the_next(self, shop: Shop) -> None:
+        made = enter(shop, ends=ahead(2))
+        after = enter(shop, begins=ahead(3), ends=ahead(4))
+        refused = self.extend(shop, made["id"], 409, ends=ahead(3.5))
+        assert f"maintenance {after['id']} from" in refused["detail"]
+        self.extend(shop, made["id"], 200, ends=after["begins"])
+
+    def test_what_is_over_is_entered_again(self, shop: Shop) -> None:
+        made = enter(shop)
+        shop.call("POST", f"/maintenance/{made['id']}/end")
+        assert "Enter maintenance again" in self.extend(shop, made["id"], 409, ends=ahead(20))["what_to_do"]
+
+    def test_an_operator_extends_within_a_day(self, shop: Shop, server: Server) -> None:
+        made, operator = enter(shop), server.client(server.key("operator"))
+        self.extend(shop, made["id"], 403, client=operator, ends=ahead(25))
+        self.extend(shop, made["id"], 200, client=operator, ends=ahead(23))
+        self.extend(shop, made["id"], 403, client=server.client(server.key("viewer")), ends=ahead(23.5))
+
+    def test_on_the_page(self, shop: Shop, server: Server) -> None:
+        made, person = enter(shop, ends=ahead(2)), Person(server, "operator")
+        assert "must come after" in person.send(f"/maintenance/{made['id']}/extend", 422, ends=ahead(1)[:16]).lower()
+        assert "is extended." in person.send(f"/maintenance/{made['id']}/extend", ends=ahead(10)[:16])
+        assert listed(shop)[0]["ends"] > made["ends"]
+
+
 class TestRoles:
     def test_an_operator_puts_one_machine_under_maintenance_for_a_day(self, shop: Shop, server: Server) -> None:
         operator = server.client(server.key("operator"))
@@ -81,7 +165,7 @@ class TestRoles:
             return shop.call("POST", "/maintenance", status, client=operator, **{"machine": shop.machine} | WHY | more)
 
         for beyond in ({"machine": None}, {"ends": ahead(25)}, {"stopping_anyway": False}, {"begins": ahead(20)}):
-            assert "takes the role engineer" in sent(403, **beyond)["what_to_do"]
+            assert "requires the Engineer role" in sent(403, **beyond)["what_to_do"]
         made = sent(201, ends=ahead(23))
         assert shop.call("POST", f"/maintenance/{made['id']}/end", client=operator)["state"] == "over"
 
@@ -140,8 +224,10 @@ class TestPages:
         shown = person.send("/maintenance/new", machine=shop.machine, reason="New way covers", stopping_anyway="true")
         assert "New way covers" in shown
         (made,) = listed(shop)
-        for path in (f"/machines/{shop.machine}", f"/alarms?machine={shop.machine}"):
-            assert "under maintenance until" in person.open(path)
+        for path in (f"/machines/{shop.machine}", f"/alarms?machine={shop.machine}", f"/station/{shop.machine}"):
+            shown = person.open(path)
+            assert "under maintenance until" in shown
+            assert f"“New way covers”, {person.name}" in shown
         assert "is ended. People are notified again." in person.send(f"/maintenance/{made['id']}/end")
         assert "is ended." in person.send(f"/maintenance/{made['id']}/end"), "sent twice"
         assert "under maintenance until" not in person.open(f"/machines/{shop.machine}")
@@ -165,7 +251,7 @@ class TestPages:
     def test_an_operator_who_asks_for_more_sees_who_may(self, shop: Shop, server: Server) -> None:
         person = Person(server, "operator")
         shown = person.send("/maintenance/new", 403, machine=shop.machine, reason="Oil", ends=ahead(30)[:16])
-        assert "takes the role engineer" in shown
+        assert "requires the Engineer role" in shown
 
     def test_its_ticks_count(self, shop: Shop, server: Server) -> None:
         Person(server, "engineer").send("/maintenance/new", machine=shop.machine, reason="Oil")

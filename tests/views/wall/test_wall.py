@@ -2,6 +2,7 @@
 
 import re
 from collections.abc import Iterator
+from datetime import UTC, datetime, timedelta
 
 import httpx
 import pytest
@@ -12,6 +13,7 @@ from sqlalchemy.orm import Session
 from app.errors import TooManyRequests
 from app.loop.machines import actions as machines
 from app.loop.machines.schemas import MachineIn
+from app.loop.maintenance.tables import Maintenance
 from app.loop.tables.alarms import Alarm
 from app.views.wall import queries
 from app.views.wall.pages import MOST, WITHIN, Rate
@@ -51,6 +53,23 @@ def test_it_shows_machines_alarms_and_parts(session: Session, wall: httpx.Client
     assert "out of tolerance" in shown.text
     assert "<form" not in shown.text
     assert "<a " not in shown.text
+
+
+def test_it_shows_maintenance_with_its_end_and_who_entered_it(session: Session) -> None:
+    machine = machines.add_machine(session, MachineIn(key="lathe-w", name="Lathe W", control="sinumerik"), "tests")
+    machines.add_machine(session, MachineIn(key="mill-w", name="Mill W", control="sinumerik"), "tests")
+    now = datetime(2026, 11, 30, 9, tzinfo=UTC)
+    for hours, of in ((3, machine.id), (30, None)):
+        ends = now + timedelta(hours=hours)
+        session.add(Maintenance(machine_id=of, begins=now - timedelta(hours=1), ends=ends, reason="Oil",
+            stopping_anyway=True, entered_by="A. Novak"))  # fmt: skip
+    session.flush()
+    lathe, mill = (tile.maintenance for tile in queries.wall(session, now).tiles)
+    assert lathe == mill
+    assert re.fullmatch(r"Maintenance until 1 Dec 2026 \d\d:\d\d, A\. Novak", mill)
+    assert re.fullmatch(
+        r"Maintenance until \d\d:\d\d, A\. Novak", queries.wall(session, now + timedelta(hours=24)).tiles[0].maintenance
+    )
 
 
 @pytest.mark.parametrize("share", [0, *(pytest.param(share, marks=pytest.mark.long) for share in range(1, SHARES))])
