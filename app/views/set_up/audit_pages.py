@@ -1,6 +1,7 @@
 """Set-up page: the record of changes."""
 
-import json
+import re
+from datetime import datetime
 from functools import partial
 from typing import Any
 
@@ -9,6 +10,10 @@ from fastapi import APIRouter, Request, Response
 from app.access import devices
 from app.access.audit import queries
 from app.access.deps import Engineer
+from app.core.parameters import BY_NAME, Field, FieldKind
+from app.language.i18n import _
+from app.language.numbers import as_read
+from app.loop.characteristics.wording import choice, label
 from app.views.set_up.frame import setup_page
 from app.web.deps import SessionDep
 from app.web.fields import LARGEST_ID
@@ -16,6 +21,10 @@ from app.web.paging import address, part_of
 
 router = APIRouter(include_in_schema=False)
 SHOWN = 100
+CODES = {"action", "kind", "state", "status", "means"}
+LENGTHS = {"offset", "total", "average", "hand_measured", "empirical_value"}
+DIGEST = re.compile(r"[0-9a-f]{40,}")
+MOMENT = re.compile(r"\d{4}-\d\d-\d\dT\d\d:\d\d:\d\d(\.\d+)?(Z|[+-]\d\d:\d\d)")
 
 
 @router.get("/setup/audit")
@@ -43,7 +52,10 @@ def audit_page(
         "audit.html",
         caller,
         "audit",
-        entries=[(entry, changes(entry.before, entry.after)) for entry in part.rows],
+        entries=[
+            (entry, changes(entry.before, entry.after, of_parameters=entry.subject.startswith("characteristic/")))
+            for entry in part.rows
+        ],
         devices=devices.names_of(session, {entry.device_id for entry in part.rows if entry.device_id}),
         subject=subject,
         actor=actor,
@@ -52,35 +64,70 @@ def audit_page(
     )
 
 
-def changes(before: dict[str, Any] | None, after: dict[str, Any] | None) -> list[tuple[str, str, str]]:
-    """List the differences: (name, from, to), with nested sets taken apart."""
+def changes(
+    before: dict[str, Any] | None, after: dict[str, Any] | None, *, of_parameters: bool = False
+) -> list[tuple[str, str, str]]:
+    """List the differences: (name, from, to), with nested sets taken apart. of_parameters: names are those of parameters.
+
+    >>> changes({"parameters": {"zero_range": 0.001}}, {"parameters": {"zero_range": 0.002}}, of_parameters=True)
+    [('Zero range (R33)', '0.001 mm', '0.002 mm')]
+    """
     old, new = _flat(before or {}), _flat(after or {})
-    return [
-        (name, old.get(name, "–"), new.get(name, "–"))
-        for name in dict.fromkeys([*old, *new])
-        if old.get(name) != new.get(name)
-    ]
+    found = []
+    for path in dict.fromkeys([*old, *new]):
+        if old.get(path) != new.get(path) and path != "digest":  # of a photo: for programs, which read it as JSON
+            field = BY_NAME.get(path.rpartition(".")[2]) if of_parameters else None
+            was, is_now = (_said(side[path], field) if path in side else "–" for side in (old, new))
+            if path in CODES:
+                was, is_now = was.replace("_", " "), is_now.replace("_", " ")
+            elif path in LENGTHS:
+                was, is_now = (f"{said} mm" if said != "–" else said for said in (was, is_now))
+            found.append((_named(path, field), was, is_now))
+    return found
 
 
-def _flat(values: dict[str, Any], prefix: str = "") -> dict[str, str]:
-    flat: dict[str, str] = {}
+def _named(path: str, field: Field | None) -> str:
+    if field is None:
+        return path.replace("_", " ").replace(".", " · ")
+    return f"{label(field.name)} ({field.r})" if field.r else label(field.name)
+
+
+def _flat(values: dict[str, Any], prefix: str = "") -> dict[str, Any]:
+    flat: dict[str, Any] = {}
     for name, value in values.items():
-        if isinstance(value, dict):
+        if isinstance(value, dict) and "code" not in value:
             flat |= _flat(value, f"{prefix}{name}.")
         elif value is not None:
-            flat[prefix + name] = _said(value)
+            flat[prefix + name] = value
     return flat
 
 
-def _said(value: Any) -> str:
-    """A value as people read it: what is in a list is reported, not written as JSON."""
+def _said(value: Any, field: Field | None = None) -> str:
+    """A value as people read it: what is in a list is reported, not written as JSON.
+
+    >>> _said(True), _said(0.1 + 0.2), _said(["a", 2]), _said("9f86d081884c7d659a2feaa0c55ad015a3bf4f1b2b0b822cd15d6c15b0f00a08")
+    ('yes', '0.3', 'a, 2', '9f86d081884c…')
+    """
+    if isinstance(value, bool):
+        return _("yes") if value else _("no")
+    if isinstance(value, int | float):
+        number = f"{value:.7f}".rstrip("0").rstrip(".").replace("-", "−")
+        return f"{number} mm" if field and field.kind is FieldKind.LENGTH else number
     if isinstance(value, str):
-        return value
+        if field and value in field.choices:
+            return choice(field.name, value)
+        if MOMENT.fullmatch(value):
+            return as_read(datetime.fromisoformat(value))
+        return f"{value[:12]}…" if DIGEST.fullmatch(value) else value
     if isinstance(value, list):
         sets = any(isinstance(item, dict) for item in value)
         return ("; " if sets else ", ").join(map(_said, value))
     if isinstance(value, dict):
         # What followed an alarm is a code with its values; the code says what the values are of.
-        values = [f"{name} {_said(item)}" for name, item in value.items() if name != "code" and item is not None]
-        return f"{value['code']}: {', '.join(values)}" if "code" in value else ", ".join(values)
-    return json.dumps(value, ensure_ascii=False)
+        values = [
+            f"{name.replace('_', ' ')} {_said(item)}"
+            for name, item in value.items()
+            if name != "code" and item is not None
+        ]
+        return f"{value['code'].replace('_', ' ')}: {', '.join(values)}" if "code" in value else ", ".join(values)
+    return "–"

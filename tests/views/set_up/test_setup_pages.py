@@ -12,7 +12,7 @@ from app.loop.characteristics import actions as characteristics
 from app.loop.characteristics.schemas import CharacteristicIn
 from app.views.set_up.machine_pages import stopping
 from tests.conftest import Server
-from tests.shop import PARAMETERS, Person, Shop, unique
+from tests.shop import ACTOR, PARAMETERS, Person, Shop, unique
 
 SERBIAN = "Седиште „лежаја” Ø40 <b>h6</b> & 'A'"
 FORM = {
@@ -319,6 +319,22 @@ def test_the_record_of_changes(engineer: Person, viewer: Person, shop: Shop) -> 
     assert "&lt;i&gt;2&lt;/i&gt;" in page
     assert "Nothing recorded here" in engineer.open("/setup/audit?subject=machine/nowhere&before=x")
     viewer.open("/setup/audit", 403)
+
+
+def test_the_record_of_changes_has_words(engineer: Person, shop: Shop) -> None:
+    """Names of parameters, units, times by the plant's clock, yes and no: no JSON."""
+    shop.call(
+        "PATCH",
+        f"/characteristics/{shop.characteristic}",
+        parameters=PARAMETERS | {"zero_range": 0.002},
+        reason="Calmer",
+    )
+    shop.call("POST", "/maintenance", 201, machine=shop.machine, reason="Oil")
+    page = engineer.open(f"/setup/audit?subject=characteristic/{shop.characteristic}")
+    assert re.search(r"Zero range \(R33\).*<del>0.001 mm</del> → <ins>0.002 mm</ins>", page)
+    kept = engineer.open(f"/setup/audit?actor={ACTOR}&q=maintenance")
+    assert re.search(r"stopping anyway</span>\s*<ins>yes", kept)
+    assert not re.search(r"<ins>\d{4}-\d\d-\d\dT", kept)
 
 
 def test_every_page_of_setup_opens(admin: Person, shop: Shop) -> None:
