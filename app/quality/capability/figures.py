@@ -127,8 +127,11 @@ def probability(drawn: CapabilityChart) -> Chart:
         )
     ]
     if drawn.mean is not None and drawn.overall:
-        ends = [(drawn.mean + side * reach * drawn.overall) * 1000 for side in (-1, 1)]
-        marks.append(Series(ends, [-reach, reach], Pen("correction", 2), meta="line", name=_("Normal distribution")))
+        # Readings beyond the picture would tilt the line away from all that are in it.
+        mean, sigma = (drawn.mean, drawn.overall) if near.size == n else (float(near.mean()), float(near.std(ddof=1)))
+        name = _("Normal distribution") if near.size == n else _("Normal distribution of the readings shown")
+        ends = [(mean + side * reach * sigma) * 1000 for side in (-1, 1)]
+        marks.append(Series(ends, [-reach, reach], Pen("correction", 2), meta="line", name=name))
     shares = Axis(
         _("Share of the readings below"),
         reach=(-reach, reach),
