@@ -123,8 +123,8 @@ def violations(page: Page, states: tuple[State, ...] = STATES) -> dict[str, str]
 FINGER = 44  # px
 
 # Everything that reacts, smaller than a finger: by itself, by its label, or by the row that its ::after covers. Links in sentences may be
-# as high as their line, and what is seen only with the keyboard may have any size. The sentence of a term is no act: 24 px will do (2.5.8)
-# for a word, and for an R number with a mouse.
+# as high as their line, and what is seen only with the keyboard may have any size. The sentence of a term is no act: with a mouse 24 px
+# will do (2.5.8).
 SMALL = """(least) => {
   const REACTS = "a[href], button, input:not([type=hidden]), select, textarea, summary, [role=button]";
   const inSentence = (at) => {
@@ -149,7 +149,7 @@ SMALL = """(least) => {
   for (const at of document.querySelectorAll(REACTS)) {
     if (!at.checkVisibility({ visibilityProperty: true, opacityProperty: false }) || at.disabled || at.closest(".skip-link") || inSentence(at)) continue;
     const { width, height } = boxOf(at);
-    const wanted = at.matches(innerWidth > 1100 ? "[data-term]" : ".term") ? 24 : least;
+    const wanted = at.matches("[data-term]") && innerWidth > 1100 ? 24 : least;
     if (Math.round(width) < wanted || Math.round(height) < wanted)
       small.push(`${Math.round(width)} × ${Math.round(height)} ${at.outerHTML.replace(/\\s+/g, " ").slice(0, 140)}`);
   }

@@ -137,7 +137,8 @@ def zone_chart(
             every=1 if last - first <= 12 else None,
             grid=False,
         ),
-        Room(left, right, 48),
+        Room(left, right, 48, top=12 if brief else None),
+        legend="below" if brief else "above",  # on a phone the readings come first
     )
 
 
