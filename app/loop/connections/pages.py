@@ -22,6 +22,7 @@ from app.web.templates import page
 
 router = APIRouter(include_in_schema=False)
 ON_PAGE = 200
+MOST_TO_CONNECT = 12
 
 
 def _silent_after(request: Request) -> timedelta:
@@ -39,6 +40,7 @@ def connections_page(request: Request, session: SessionDep, after: Word = None, 
         "connections/list.html",
         part=part_of(rows, ON_PAGE, after, lambda row: row.machine.key, link, "after"),
         q=q,
+        to_connect=[] if rows or q else machines.machines(session)[:MOST_TO_CONNECT],
         wording=wording,
         silent_after=_silent_after(request),
     )
