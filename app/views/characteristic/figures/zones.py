@@ -114,14 +114,8 @@ def zone_chart(
     offsets = offset_lane(steps, events, span, total_before, half=half_of(limits), brief=brief)
     total = Axis(
         "" if brief else _("Σ, µm"),  # the lane is low; the key names it in full
-        ticks=3,
-        format="+.1f",
-        zero="faint",
-        line=False,
-        fixed=True,
-        letters=11,
-        title_letters=12,
-    )
+        ticks=3, format="+.1f", zero="faint", line=False, fixed=True, letters=11, title_letters=12,
+    )  # fmt: skip
     hidden = Axis(reach=(-1, 1), grid=False, line=False, labelled=False, fixed=True)
     return Chart(
         [
@@ -138,7 +132,7 @@ def zone_chart(
             grid=False,
         ),
         Room(left, right, 48, top=12 if brief else None),
-        legend="below" if brief else "above",  # on a phone the readings come first
+        "below" if brief else "above",  # on a phone the readings come first
     )
 
 
