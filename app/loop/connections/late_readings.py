@@ -8,7 +8,7 @@ history that is sent as readings are no network that failed.
 from datetime import datetime, timedelta
 from typing import Any
 
-from sqlalchemy import Interval, Select, func, literal, select
+from sqlalchemy import Interval, Select, func, literal, or_, select
 from sqlalchemy.orm import Session, aliased
 
 from app.db.events import publish
@@ -24,13 +24,14 @@ from app.loop.tables.machines import Machine
 from app.loop.tables.readings import Reading, ReadingContext
 
 NAME = "late_readings"
-BUNCH = 2
+BUNCH, WITHIN = 2, timedelta(minutes=10)
+"""So many in so short a time: one by one, too, as a network that comes and goes lets them through."""
 AT_WORK = timedelta(days=1)
 """Before the first that came late: a reading came in time."""
 
 
 def due(session: Session) -> list[Unit]:
-    """Return the alarms to raise for what has come since the last run."""
+    """Return the alarms to raise for what has come since the last run, with those just before it that no alarm has counted."""
     last = session.get(JobRun, NAME, populate_existing=True)
     if last is None:
         return []
@@ -58,6 +59,9 @@ JOB = PeriodicJob(NAME, due, tell)
 
 
 def _late(since: datetime) -> Select[Machine, datetime, datetime, int]:
+    alarms_of = (Alarm.machine_id == Reading.machine_id, Alarm.kind == READINGS_LATE.name)
+    counted = select(func.max(Alarm.last_at)).where(*alarms_of).scalar_subquery()
+    active = select(Alarm.id).where(*alarms_of, Alarm.acknowledged_at.is_(None))
     by_hand = select(ReadingContext.sequence).where(
         ReadingContext.machine_id == Reading.machine_id,
         ReadingContext.characteristic_id == Reading.characteristic_id,
@@ -72,13 +76,14 @@ def _late(since: datetime) -> Select[Machine, datetime, datetime, int]:
             func.count().label("late"),
         )
         .where(
-            Reading.received_at > since,
+            Reading.received_at > since - WITHIN,
+            Reading.received_at > func.coalesce(counted, since - WITHIN),
             Reading.received_at > Reading.measured_at + literal(LATELY, Interval),
             Reading.code != "imported",
             ~by_hand.exists(),
         )
         .group_by(Reading.machine_id)
-        .having(func.count() >= BUNCH)
+        .having(or_(func.count() >= BUNCH, active.exists()), func.max(Reading.received_at) > since)
         .subquery()
     )
     return (

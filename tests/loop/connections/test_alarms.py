@@ -234,6 +234,39 @@ def test_readings_of_a_machine_whose_network_failed_say_so(shop: Shop) -> None:
     assert shop.call("GET", f"/alarms/{alarm['id']}")["count"] == 1
 
 
+def test_late_ones_that_come_one_by_one_say_so(shop: Shop) -> None:
+    """The job looks once a minute: one of them in each look."""
+    shop.read(0)
+    came_in_time(shop, 50)
+
+    def late_one(minutes: int, came: int) -> None:
+        """Measured, and received, so many minutes ago."""
+        shop.push([0.0], measured_at=[ago(minutes=minutes)])
+        with psycopg.connect(shop.server.database.dsn) as connection:
+            connection.execute("SET session_replication_role = replica")
+            connection.execute(
+                "UPDATE reading SET received_at = now() - make_interval(mins => %s) WHERE received_at > now() - interval '1 minute'"
+                " AND sequence > 1 AND machine_id = (SELECT id FROM machine WHERE key = %s)",
+                [came, shop.machine],
+            )
+
+    late_one(40, came=3)
+    looked_for_late(shop)
+    assert shop.alarms() == [], "one alone"
+    late_one(30, came=1)
+    looked_for_late(shop)
+    [alarm] = shop.alarms()
+    assert alarm["text"].startswith("2 readings came late: measured from ")
+    shop.push([0.0], measured_at=[ago(minutes=20)])
+    looked_for_late(shop)
+    looked_for_late(shop)
+    [alarm] = shop.alarms()
+    assert alarm["text"].startswith("3 readings came late"), "each counts once"
+    shop.acknowledge(alarm["id"], "noted")
+    looked_for_late(shop)
+    assert shop.alarms() == []
+
+
 def test_a_clock_that_is_behind_and_sizes_by_hand_are_no_network_that_failed(server: Server) -> None:
     behind, by_hand = Shop(server), Shop(server)
     behind.push([0.0] * 3, measured_at=[ago(minutes=60 - n) for n in range(3)])
