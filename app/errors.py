@@ -13,6 +13,7 @@
     ├── DatabaseAway       503  with Retry-After; nothing was stored
     │   ├── Busy           503  other work holds what is needed, such as the machine; nothing was stored
     │   └── DiskFull       503  of the server; nothing was stored
+    ├── Compiling          503  /health/ready alone: the first start after an installation or upgrade
     ├── ServerEnding       503  it does not wait for this request any longer
     ├── OutcomeUnknown     503  the database went away during the commit; send again with the same key
     └── Unexpected         500  an unhandled error; its trace is in the log under the id of the request
@@ -233,6 +234,21 @@ class DiskFull(DatabaseAway):
             "nothing needs to be started again."
         )
         self.retry_after = 10
+
+
+class Compiling(InbandError):
+    """The server runs, and compiles what decides readings: once after an installation or upgrade. They are taken, and wait for it."""
+
+    status = 503
+    kind = "compiling"
+    title = "Not ready: compiling"
+
+    def __init__(self) -> None:
+        super().__init__(
+            "Not ready: the server compiles what decides readings, once after an installation or upgrade. Until then a reading waits.",
+            "Wait; nothing needs to be started again.",
+            retry_after=2,
+        )
 
 
 class ServerEnding(InbandError):

@@ -203,7 +203,10 @@ async def _nobody(_request: Request) -> None:
 def _compile_now(ends: Event) -> None:
     """Compile what the readings door needs, and then what pages need, so that nobody waits for the compiler."""
     try:
-        columnar.compile_now()
+        try:
+            columnar.compile_now()
+        finally:
+            health.compiling.clear()
         for _ in compile_each():
             if ends.is_set():
                 return
@@ -216,6 +219,7 @@ async def process(ending: Callable[[], None]) -> AsyncIterator[None]:
     """The work of a server process for all its plants: compiling, the proof, memory given back."""
     sys.setswitchinterval(TURN)
     ends = Event()
+    health.compiling.set()
     compiling = asyncio.get_running_loop().run_in_executor(None, _compile_now, ends)
     giving_back = asyncio.get_running_loop().create_task(give_back_free_memory(), name="free memory")
     proving = proofs.begin_later(keep_for_good)

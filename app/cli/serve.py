@@ -33,7 +33,7 @@ from app.cli.base import (
 )
 from app.cli.plants import migrate_all
 from app.db.disk import watch
-from app.errors import InbandError
+from app.errors import Compiling, InbandError
 
 if TYPE_CHECKING:
     from starlette.types import ASGIApp
@@ -45,6 +45,8 @@ log = logging.getLogger(__name__)
 
 END_WITHIN = 5.0
 """Seconds that the application has for ending in order; then it is left as it is, and the database is stopped in order."""
+LOADED_WITHIN = 3.0
+"""Seconds in which a start has loaded what an earlier one has compiled."""
 
 Host = Annotated[str | None, typer.Option(envvar="INBAND_HOST", help="Address to listen on.", show_default="127.0.0.1")]
 Port = Annotated[int | None, typer.Option(envvar="INBAND_PORT", help="Port to listen on.", show_default="8000")]
@@ -319,27 +321,37 @@ def _local_host(settings: "Settings") -> str:
 
 
 def _say_address(settings: "Settings") -> None:
-    """Print the address as soon as connections to it are accepted."""
+    """Print the address as soon as connections to it are accepted; and where it has to compile first, that, and when it is ready."""
     while True:
         with suppress(OSError), socket.create_connection((_local_host(settings), settings.port), timeout=2):
             break
         time.sleep(0.05)
     say(f"Inband: {settings.address}  (Ctrl-C ends it)")
+    time.sleep(LOADED_WITHIN)
+    if _readiness(settings) == Compiling.kind:
+        say("Not ready yet: it compiles what decides readings, once after an installation or upgrade.")
+        while _readiness(settings) == Compiling.kind:
+            time.sleep(LOADED_WITHIN)  # each is a line in the log
+        say("Ready.")
 
 
 def _once_ready(settings: "Settings", beside: "Callable[[Settings], None]") -> None:
+    while (missing := _readiness(settings)) != "":
+        time.sleep(LOADED_WITHIN if missing == Compiling.kind else 0.1)
+    beside(settings)
+
+
+def _readiness(settings: "Settings") -> str | None:
+    """What `/health/ready` says is missing, as the kind of its problem; empty if it is ready, None if it says nothing."""
     import httpx
 
     host = _local_host(settings)
     url = f"http://[{host}]" if ":" in host else f"http://{host}"
-    while True:
-        try:
-            if httpx.get(f"{url}:{settings.port}/health/ready", timeout=2).status_code == httpx.codes.OK:
-                break
-        except httpx.HTTPError:
-            pass
-        time.sleep(0.1)
-    beside(settings)
+    try:
+        answer = httpx.get(f"{url}:{settings.port}/health/ready", timeout=2)
+        return "" if answer.is_success else str(answer.json()["type"]).rpartition(":")[2]
+    except (httpx.HTTPError, ValueError, LookupError, TypeError):
+        return None
 
 
 def _end(_number: int, _frame: FrameType | None) -> None:

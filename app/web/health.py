@@ -3,6 +3,7 @@
 from collections.abc import Iterable
 from contextlib import suppress
 from pathlib import Path
+from threading import Event
 from typing import Any
 
 from fastapi import APIRouter, Request
@@ -23,10 +24,12 @@ from starlette.responses import Response
 from app.db.disk import free, is_full
 from app.db.engine import Database
 from app.db.replica import Replica
-from app.errors import DiskFull
+from app.errors import Compiling, DiskFull
 from app.web.api import EVERY_ERROR
 from app.web.deps import IN_TURN, SettingsDep
 
+compiling = Event()
+"""Set while this process compiles what decides readings: whoever posts one waits for that."""
 router = APIRouter(tags=["health"], generate_unique_id_function=lambda route: route.name)
 
 
@@ -42,7 +45,9 @@ async def live() -> dict[str, str]:
 
 @router.get("/health/ready", responses=_says({"status": "ready"}) | {503: EVERY_ERROR[503]}, dependencies=[IN_TURN])
 def ready(request: Request, settings: SettingsDep) -> dict[str, str]:
-    """The process answers, reaches its database, and its disk is not full. Where there is a replica: how far it is behind."""
+    """The process decides readings, reaches its database, and its disk is not full. Where there is a replica: how far it is behind."""
+    if compiling.is_set():
+        raise Compiling
     if is_full(settings.data_dir):
         raise DiskFull
     database: Database = request.app.state.database

@@ -69,6 +69,12 @@ def test_the_server_is_not_ready_until_there_is_room(tmp_path: Path, monkeypatch
     assert get(app, "/health/ready").json()["type"] == "urn:inband:problem:disk-full"
     monkeypatch.setattr(disk, "NOTHING", 0)
     assert get(app, "/health/ready").status_code == 200
+    health.compiling.set()
+    answer = get(app, "/health/ready")
+    health.compiling.clear()
+    assert (answer.status_code, answer.json()["type"]) == (503, "urn:inband:problem:compiling")
+    assert "compiles what decides readings, once after an installation or upgrade" in answer.json()["detail"]
+    assert get(app, "/health/ready").status_code == 200
 
 
 @pytest.mark.parametrize("name", ["a.csv", "a.xlsx", "a.dfd"])
