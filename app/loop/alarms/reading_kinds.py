@@ -8,7 +8,7 @@ from sqlalchemy.orm import object_session
 
 from app.core.probing import TouchError
 from app.language.i18n import _
-from app.language.numbers import NOTHING, read_um, tolerance_um
+from app.language.numbers import NOTHING, age, as_read, read_um, tolerance_um
 from app.loop.alarms.kinds import AlarmKind, register
 from app.loop.readings.wording import first_move_sentence, touch_problem
 from app.loop.tables.alarms import Alarm
@@ -35,25 +35,50 @@ def moved_by(step: Mapping[str, Any], half: float | None = None) -> str:
 
 
 def _against(alarm: Alarm) -> str:
-    """A sentence where the newest correction moved the size the wrong way: the edge is not the cause, perhaps."""
+    """A sentence where the edge is not the cause, perhaps: the newest correction moved the size the wrong way, or a clock is behind."""
+    if "lag" in alarm.data:
+        text = _(
+            "By machined_at the part was cut {lag} before the reading came in, without corrections that are applied by now: if it was "
+            "cut later, the clock of the machine is behind."
+        )
+        return " " + text.format(lag=age(alarm.data["lag"]))
     if "against" not in alarm.data:
         return ""
     text = _("The size went the wrong way: {step}. Check the sign of the factor and the offset register.")
     return " " + text.format(step=moved_by(alarm.data["against"], alarm.data.get("limit")))
 
 
+def _so_far(alarm: Alarm) -> str:
+    """A sentence that counts the parts, where it was more than one: nobody need have seen the first."""
+    if (alarm.count or 1) < 2:
+        return ""
+    return " " + _("{n} parts so far, the last at {at}.").format(n=alarm.count, at=as_read(alarm.last_at, "minutes"))
+
+
 def _tool_worn(alarm: Alarm) -> str:
+    return f"{_worn(alarm)}{_went_on(alarm)}{cannot_be_stopped(alarm)}"
+
+
+def _went_on(alarm: Alarm) -> str:
+    """A sentence where `hold` has not stopped the machine, with the number of parts."""
+    if (alarm.count or 1) < 2:
+        return ""
+    text = _("The machine went on cutting: {n} parts like this so far, the last at {at}.")
+    return " " + text.format(n=alarm.count, at=as_read(alarm.last_at, "minutes"))
+
+
+def _worn(alarm: Alarm) -> str:
     data = alarm.data
     if "decided" in data and abs(data["deviation"]) < data["limit"] <= abs(data["decided"]):
         text = _(
             "Deviation {deviation} counts as {decided}, which has reached the wear limit {limit}: corrections that are not confirmed are "
             "counted in. Either one of them is in the offset already, or the tool is worn or broken."
         )
-        return f"{_deviation(alarm, text)}{cannot_be_stopped(alarm)}"
+        return _deviation(alarm, text)
     text = _("Deviation {deviation} has reached the wear limit {limit}: tool {tool} is worn or broken.")
     if alarm.tool_memory is None:
         text = _("Deviation {deviation} has reached the wear limit {limit}: the tool is worn or broken.")
-    return f"{_deviation(alarm, text)}{cannot_be_stopped(alarm)}"
+    return _deviation(alarm, text)
 
 
 def _not_accepted(alarm: Alarm) -> str:
@@ -73,7 +98,9 @@ OVERSIZE = register(
         "oversize",
         concerns_parts=True,
         word=lambda: _("Oversize"),
-        sentence=lambda alarm: _deviation(alarm, _("The part is too large: deviation {deviation}, tolerance {limit}.")),
+        sentence=lambda alarm: (
+            _deviation(alarm, _("The part is too large: deviation {deviation}, tolerance {limit}.")) + _so_far(alarm)
+        ),
         what_to_do=_set_aside,
         icon="oversize",
         actions=("noted", "measured_by_hand", "tool_replaced", "false_reading"),
@@ -84,7 +111,9 @@ UNDERSIZE = register(
         "undersize",
         concerns_parts=True,
         word=lambda: _("Undersize"),
-        sentence=lambda alarm: _deviation(alarm, _("The part is too small: deviation {deviation}, tolerance {limit}.")),
+        sentence=lambda alarm: (
+            _deviation(alarm, _("The part is too small: deviation {deviation}, tolerance {limit}.")) + _so_far(alarm)
+        ),
         what_to_do=_set_aside,
         icon="undersize",
         actions=("noted", "measured_by_hand", "tool_replaced", "false_reading"),

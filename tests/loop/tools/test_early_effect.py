@@ -15,9 +15,9 @@ PARTS = 60
 class Machine:
     """A lathe that cuts a part a minute and applies each correction before the next; wear 0.5 µm a part, scatter 0.3 µm."""
 
-    def __init__(self, shop: Shop, behind: timedelta) -> None:
+    def __init__(self, shop: Shop, behind: timedelta, **more: Any) -> None:
         self.shop, self.behind = shop, behind
-        self.key = shop.another("clock", tool_memory=4, average_memory=6, **FOLLOWS)
+        self.key = shop.another("clock", tool_memory=4, average_memory=6, **FOLLOWS | more)
         self.start = datetime.now(UTC) - timedelta(minutes=PARTS + 5)
         self.chance, self.offset, self.sizes = np.random.default_rng(4), 0.0, list[float]()
 
@@ -51,6 +51,28 @@ def test_a_clock_that_is_behind_pauses_the_tool_before_parts_are_out(shop: Shop,
     assert shop.tool(4)["paused_by"] is None
     machine.behind = timedelta()
     assert [machine.part()["action"] for _part in range(4)].count("correct") >= 1
+
+
+def test_where_the_sizes_do_not_show_it_the_alarm_about_the_part_names_the_clock(shop: Shop) -> None:
+    """With k 2 the loop follows wear by half, and no pause comes: half of the parts are out, and each alarm says what it may be."""
+    machine = Machine(shop, timedelta(hours=3), weighting_factor=2)
+    while "oversize" not in {each["kind"] for each in shop.alarms()}:
+        machine.part()
+        assert len(machine.sizes) < PARTS
+    (alarm,) = [each for each in shop.alarms() if each["kind"] == "oversize"]
+    assert "By machined_at the part was cut 3 h" in alarm["text"]
+    assert "the clock of the machine is behind" in alarm["text"]
+
+
+def test_a_part_that_is_out_with_a_clock_that_is_right_names_none(shop: Shop) -> None:
+    machine = Machine(shop, timedelta())
+    for _part in range(5):
+        machine.part()
+    machine.sizes.extend([0.0] * 30)  # it wore on meanwhile
+    machine.start += timedelta(minutes=-30)
+    assert machine.part()["alarms"]
+    (alarm,) = shop.alarms()
+    assert (alarm["kind"], "clock" in alarm["text"]) == ("oversize", False)
 
 
 def test_a_clock_that_is_right_pauses_nothing(shop: Shop) -> None:

@@ -25,7 +25,7 @@ from app.loop.readings.records import Entry
 from app.loop.readings.schemas import ReadingIn
 from app.loop.readings.writer.corrections_in_effect import confirm, corrections_in_effect, issued_total
 from app.loop.readings.writer.doubts import doubt
-from app.loop.readings.writer.opposed import name_correction, part_of, pauses, remember
+from app.loop.readings.writer.opposed import name_clock, name_correction, part_of, pauses, remember
 from app.loop.readings.writer.pending import (
     PendingAlarm,
     PendingCorrection,
@@ -125,6 +125,7 @@ def decide_reading(pending: PendingWrites, entry: Entry, reading: ReadingIn, now
         paused_by, decision = opposed, judged(state=state._replace(paused=True))
     alarms = [_signal(pending, stream, signal, sequence, decision, results, fault) for signal in decision.alarms]
     name_correction(alarms, stream, newest)
+    name_clock(alarms, tool, reading, compensated, now)
     asked = doubt(pending, stream, reading, sequence)
     alarms += [alarm for alarm in (opposed, asked) if alarm is not None]
     correction = (

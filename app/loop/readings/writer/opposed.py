@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from app.core.decision.decide import Decision
+from app.core.decision.decide import Decision, ReadingAlarm
 from app.core.decision.limits import Zone, nanometres
 from app.core.early import acts_early
 from app.core.gain import LONGEST, Step, against, expected_scatter, opposed
@@ -109,6 +109,23 @@ def name_correction(alarms: Sequence[PendingAlarm], stream: PendingStream, newes
     if found is not None:
         for alarm in alarms:
             alarm.data["against"] = _said(stream.tool, found)
+
+
+def name_clock(
+    alarms: Sequence[PendingAlarm],
+    tool: PendingTool | None,
+    reading: ReadingIn,
+    compensated: float | None,
+    now: datetime,
+) -> None:
+    """Say in alarms about a deviation that its part counts as cut without applied corrections by the machine's clock alone."""
+    if tool is None or compensated is None or reading.machined_at is None or reading.correction_in_effect is not None:
+        return
+    if nanometres(tool.total) == nanometres(compensated):
+        return
+    for alarm in alarms:
+        if alarm.kind != ReadingAlarm.PROBE_FAULT.value:
+            alarm.data["lag"] = round((now - reading.machined_at).total_seconds(), 1)
 
 
 def _said(tool: PendingTool, step: Step) -> dict[str, Any]:
