@@ -198,13 +198,18 @@ def _not_taken(alarm: Alarm) -> str:
         )
     count = int(data.get("waiting") or 1)
     since = as_read(datetime.fromisoformat(str(data["since"])), "minutes") if data.get("since") else "–"
-    return ngettext(
+    text = ngettext(
         "The machine does not take correction {first} of tool {tool}, which waits since {since}. Parts are cut with the offset "
         "of before.",
         "The machine does not take {n} corrections of tool {tool}, the first of which, {first}, waits since {since}. Parts are "
         "cut with the offset of before.",
         count,
     ).format(n=count, first=data.get("first"), tool=alarm.tool_memory, since=since)
+    if not data.get("bridge") or data.get("carried", True):
+        return text
+    return f"{text} " + _(
+        "Its bridge carries no corrections: somebody has to enter them at the control and confirm them."
+    )
 
 
 CORRECTIONS_NOT_TAKEN = register(

@@ -88,7 +88,10 @@ def mark_applied(
         if caller.kind != "machine":  # what a machine does all day is in the history of its tools
             record_status(session, machine, pending, caller, "correction applied", "pending", None)
     reported = tool.offset if offset_after is None else offset_after
-    return _reported(session, machine, correction, together, tool, caller, reported, tool.offset, before, at)
+    done = _reported(session, machine, correction, together, tool, caller, reported, tool.offset, before, at)
+    if caller.kind == "machine" or done.note is not None:
+        return done
+    return done._replace(note=wording.named_by_readings(correction, queries.named_when_asked(session, correction)))
 
 
 def _may_not_be_in(

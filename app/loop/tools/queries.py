@@ -16,8 +16,9 @@ from app.loop.characteristics.correction_queries import open_corrections
 from app.loop.characteristics.queries import characteristics
 from app.loop.readings import queries as readings
 from app.loop.tables.characteristics import Characteristic
+from app.loop.tables.connections import Connection
 from app.loop.tables.machines import Machine
-from app.loop.tables.readings import Stream
+from app.loop.tables.readings import Reading, Stream
 from app.loop.tables.tools import OPEN, AverageMemory, Correction, Tool, ToolEvent
 from app.web.fields import LARGEST_SERIAL
 
@@ -332,3 +333,12 @@ def _kind(event: ToolEvent, amount: float | None) -> str:
         return "reported" if event.kind == "edit" and event.reason is None else event.kind
     differs = abs(nanometres(event.offset_after - event.offset_before - amount)) > OFFSET_TOLERANCE
     return "reported" if differs else event.kind
+
+
+def named_when_asked(session: Session, correction: Correction) -> int | None:
+    """The last correction in effect that the reading named which asked for this one; None where a bridge answers for the control."""
+    carried = select(Connection.locations).where(Connection.machine_id == correction.machine_id)
+    if any(place.get("corrected", True) for place in session.scalar(carried) or ()):
+        return None
+    asked = session.get(Reading, (correction.machine_id, correction.characteristic_id, correction.sequence))
+    return None if asked is None else asked.correction_in_effect

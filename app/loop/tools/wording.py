@@ -186,6 +186,16 @@ def is_out(correction: Correction) -> str:
     ).format(number=correction.number, who=correction.fetched_by, at=moment(correction.fetched_at))
 
 
+def named_by_readings(correction: Correction, named: int | None) -> str | None:
+    """Said to a person who marks a correction applied, where the readings of the machine name the last one in effect."""
+    if named is None or named >= correction.number:
+        return None
+    return _(
+        "The readings of this machine name the last correction in effect, {named} when they asked for {number}: while they name one "
+        "before {number}, parts count as cut without it, and it is taken back. Let the machine name {number}, or leave correction_in_effect out."
+    ).format(named=named, number=correction.number)
+
+
 def still_active(alarm: int) -> str:
     """Said when a held correction is released past its alarm."""
     return _(

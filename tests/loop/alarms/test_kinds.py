@@ -78,7 +78,7 @@ DATA: dict[str, list[dict[str, Any]]] = {
     "offset_differs": [{"reported": -0.0142, "expected": -0.0061}, {"correction": 9, "reported": 1.0, "expected": 0.9}],
     "corrections_not_taken": [
         {"waiting": 1, "first": 12, "since": _AT},
-        {"waiting": 4, "first": 12, "since": _AT},
+        {"waiting": 4, "first": 12, "since": _AT, "bridge": True, "carried": False},
     ],
     "unusual_gain": [_GAIN | {"verdict": verdict} for verdict in ("none", "weak", "strong", "opposite")],
     "characteristics_disagree": [{"down": "a", "up": "b", "mean_down": -0.02, "mean_up": 0.02, "times": 6}],

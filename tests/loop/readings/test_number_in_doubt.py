@@ -80,3 +80,15 @@ def test_what_fits_raises_no_doubt(shop: Shop, batch: bool) -> None:
         shop.read(0.5, correction_in_effect=number, machined_at=cut)
     shop.read(0.5, correction_in_effect=0)
     assert doubts(shop, "all") == []
+
+
+def test_a_person_who_marks_what_the_machine_does_not_name_hears_what_its_number_does(shop: Shop) -> None:
+    """A machine that always sends 0: the correction counts as missing from its parts, and would be taken back."""
+    number = shop.read(6, correction_in_effect=0)["correction"]["number"]
+    note = shop.correction(number, "applied")["note"]
+    assert f"while they name one before {number}, parts count as cut without it" in note
+    assert shop.read(0, correction_in_effect=0)["outstanding"] == [number]
+    other = shop.read(6, correction_in_effect=number)["correction"]["number"]
+    assert shop.correction(other, "applied", client=shop.machine_client)["note"] is None, "the machine itself knows"
+    without = shop.read(6)["correction"]["number"]
+    assert shop.correction(without, "applied")["note"] is None, "it names none"

@@ -76,6 +76,17 @@ def test_corrections_in_a_row_raise_it_sooner(shop: Shop, runs: Runs) -> None:
     assert runs(3) == [], "it is not reported again for the same ones"
 
 
+@pytest.mark.parametrize("kind", ["dprnt", "folder", "mtconnect", "text"])
+def test_a_bridge_that_carries_no_corrections_is_named(shop: Shop, runs: Runs, kind: str) -> None:
+    for size in (6, 12, 18, 24, 30):
+        shop.read(size)
+    waited(shop, 6)
+    beat(shop, kind=kind, locations=[], carries_decisions=False)
+    [alarm] = runs(3)
+    assert "5 corrections of tool 3" in alarm["text"]
+    assert "Its bridge carries no corrections" in alarm["text"]
+
+
 def test_what_the_bridge_holds_back_is_reported_at_once_with_its_reason(shop: Shop, runs: Runs) -> None:
     shop.read(6)
     beat(shop, held_back=[HELD], hold_all=True)
