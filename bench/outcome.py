@@ -8,15 +8,17 @@ that takes longer for a part than the bridge for a poll. ``python -m bench.outco
 import argparse
 import asyncio
 import contextlib
+import json
 import logging
 import random
+import sqlite3
 import ssl
 import tempfile
 import time
 from collections.abc import Awaitable, Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
-from datetime import datetime
+from datetime import UTC, datetime, timedelta
 from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -131,11 +133,19 @@ class Outcome(NamedTuple):
 
 
 class Play:
-    """One machine at a server and its process. call: one request of the REST contract, its answer."""
+    """One machine at a server and its process. call: one request of the REST contract, its answer.
+
+    kind: of KINDS, with ``direct`` behind it where the bridge writes the offsets itself; or ``rest``. ago: minutes that a part was cut
+    before it really is: a clock that is moved in place of waiting. behind: called behind each part that the server knows.
+    """
 
     def __init__(self, call: Callable[..., Any], machine: str, kind: str, parts: int) -> None:
-        self.call, self.machine, self.kind, self.parts = call, machine, kind, parts
-        self.process = Process(features_of(kind))
+        self.call, self.machine, self.parts = call, machine, parts
+        self.kind, _, mode = kind.partition(" ")
+        self.corrections = mode or "control"
+        self.ago: Callable[[int], float] | None = None
+        self.behind: Callable[[int], None] = lambda _part: None
+        self.process = Process(features_of(self.kind))
         self.keys = {each.number: f"{machine}-{each.number}" for each in self.process.features}
         self.without_server, self.eventful = range(0), True
         self.judged = tuple(each.number for each in self.process.features if each.tool != UNMAPPED)
@@ -198,11 +208,15 @@ class Play:
 
     # --- corrected at once, by REST
 
-    def at_once(self, wait: int = 0) -> Outcome:
-        """Every correction is in the offset before the next cut, or so many parts later: a machine that asks for them."""
+    def at_once(self, wait: int = 0, *, without_server: range = range(0), takes: bool = True) -> Outcome:
+        """Every correction is in the offset before the next cut, or so many parts later: a machine that asks for them.
+
+        without_server: parts of an outage, whose readings the machine keeps. takes: False for a machine that takes no correction.
+        """
         process = self.process
 
         in_effect: dict[int, int] = {}
+        kept: list[dict[str, Any]] = []
         stopped = False
         for part in range(1, self.parts + 1):
             if stopped and process.obeys:
@@ -213,22 +227,33 @@ class Play:
                 size = process.size(feature)
                 failed = feature.number == 1 and 0 < process.blind <= part
                 found: dict[str, Any] = {"touches": []} if failed else {"measured": round(size, 6)}
-                answer = self.call(
-                    "POST",
-                    "/readings",
-                    characteristic=self.keys[feature.number],
-                    correction_in_effect=in_effect.get(feature.tool, 0),
-                    **found,
-                )
+                found |= {
+                    "characteristic": self.keys[feature.number],
+                    "correction_in_effect": in_effect.get(feature.tool, 0),
+                }
+                if self.ago is not None:
+                    found["measured_at"] = self._measured_at(part)
+                if part in without_server:
+                    kept.append(found)
+                    continue
+                while kept:
+                    self.call("POST", "/readings", **kept.pop(0))
+                answer = self.call("POST", "/readings", **found)
                 stopped = stopped or answer["action"] == "stop"
-                if wait == 0:
+                if wait == 0 and takes:
                     self._apply(feature.tool, in_effect)
             if wait and part % wait == 0:
                 for tool in sorted({each.tool for each in process.every} - {UNMAPPED}):
                     self._apply(tool, in_effect)
             self.between(part)
+            if part not in without_server:
+                self.behind(part)
 
         return self.outcome()
+
+    def _measured_at(self, part: int) -> str:
+        assert self.ago is not None
+        return (datetime.now(UTC) - timedelta(minutes=self.ago(part))).isoformat()
 
     def _apply(self, tool: int, in_effect: dict[int, int]) -> None:
         if tool == UNMAPPED:
@@ -271,6 +296,7 @@ class Play:
             "interval": 0.02,
             "offsets_every": 1e6,  # a tool change is told, and the new offset is set, between two looks
             "patience": PATIENCE,
+            "corrections": self.corrections,
             "characteristics": {str(number): key for number, key in self.keys.items()},
         }
         if self.kind == "haas":
@@ -293,11 +319,14 @@ class Play:
             ):
                 for part in range(1, self.parts + 1):
                     await self._part()
+                    await self._stored(unit)
+                    self._backdate(folder / "outcome.sqlite3", part)
                     if part in self.without_server:
                         await self._kept(unit, silent)
                         continue
                     await self._settled(unit, client)
                     self.between(part)
+                    self.behind(part)
                     if part in {self.parts // 3, self.parts // 2, self.parts * 2 // 3 + LEFT}:
                         await self._settled(unit, client)
                 await client.heartbeat(self.machine, **await server_side.heartbeat(unit))
@@ -323,9 +352,18 @@ class Play:
 
         await _until(stored, "all readings are in the store")
 
+    def _backdate(self, store: Path, part: int) -> None:
+        """Let the readings of this part have been measured as long ago as `ago` says."""
+        if self.ago is None:
+            return
+        with contextlib.closing(sqlite3.connect(store, timeout=PATIENCE)) as database, database:
+            rows = database.execute("SELECT id, body FROM reading WHERE state = 'waiting'").fetchall()
+            for number, body in rows[-len(self.process.features) :]:
+                moved = json.dumps(json.loads(body) | {"measured_at": self._measured_at(part)})
+                database.execute("UPDATE reading SET body = ? WHERE id = ?", [moved, number])
+
     async def _kept(self, unit: Unit, silent: AsyncClient) -> None:
         """A part while no server answers: the bridge tries, and keeps what it has."""
-        await self._stored(unit)
         for step in (offering.tell, server_side._forward, offering.ask):  # noqa: SLF001 - the steps of the task
             with contextlib.suppress(Unavailable):
                 await step(unit, silent)
@@ -333,14 +371,13 @@ class Play:
     async def _settled(self, unit: Unit, client: AsyncClient) -> None:
         """What has been measured is at the server, what it wants is with the control: a part takes longer than that."""
         registers = self.process.registers
-        await self._stored(unit)
         for _ in range(3):
             for step in (offering.tell, server_side._forward, offering.ask):  # noqa: SLF001 - the steps of the task
                 await step(unit, client)
             await _until(partial(_polled, unit, unit.polls + 2), "two polls")
             if not await unit.store.intents(unit.machine.key, "answered"):
                 break
-        if unit.orders:
+        if unit.orders and self.corrections == "control":
             await _until(lambda: registers[Register.MAIL_NUMBER] != registers[Register.ANSWERED], "mail")
 
 

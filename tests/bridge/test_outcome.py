@@ -26,7 +26,7 @@ def play(server: Server, kind: str, parts: int) -> Play:
         answer.raise_for_status()
         return answer.json()
 
-    return Play(call, unique(f"outcome-{kind}"), kind, parts)
+    return Play(call, unique(f"outcome-{kind}".replace(" ", "-")), kind, parts)
 
 
 def at_once(server: Server, parts: int) -> Outcome:
