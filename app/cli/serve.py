@@ -342,7 +342,7 @@ def _once_ready(settings: "Settings", beside: "Callable[[Settings], None]") -> N
 
 
 def _readiness(settings: "Settings") -> str | None:
-    """What `/health/ready` says is missing, as the kind of its problem; empty if it is ready, None if it says nothing."""
+    """Return the kind of problem that `/health/ready` names; empty if it is ready, None if it does not answer."""
     import httpx
 
     host = _local_host(settings)

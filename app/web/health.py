@@ -29,7 +29,7 @@ from app.web.api import EVERY_ERROR
 from app.web.deps import IN_TURN, SettingsDep
 
 compiling = Event()
-"""Set while this process compiles what decides readings: whoever posts one waits for that."""
+"""Set while this process compiles what decides readings: a request with one waits for that."""
 router = APIRouter(tags=["health"], generate_unique_id_function=lambda route: route.name)
 
 

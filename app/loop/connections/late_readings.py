@@ -25,7 +25,7 @@ from app.loop.tables.readings import Reading, ReadingContext
 
 NAME = "late_readings"
 BUNCH, WITHIN = 2, timedelta(minutes=10)
-"""So many in so short a time: one by one, too, as a network that comes and goes lets them through."""
+"""Readings, and the time in which they come: one by one, too, as a network that comes and goes lets them through."""
 AT_WORK = timedelta(days=1)
 """Before the first that came late: a reading came in time."""
 
