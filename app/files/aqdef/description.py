@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import TextIO
 
 from app.files.aqdef.fields import FIELDS
-from app.files.formats import delimited
+from app.files.formats import delimited, letters
 from app.files.formats.delimited import Unusable
 from app.files.formats.repeats import Remark
 from app.language.i18n import _
@@ -136,7 +136,10 @@ def describe(source: Source) -> Description:
 
 
 def encoding_of(path: Path) -> str:
-    """By the byte order mark; else UTF-8 if the whole file is, else the one whose letters fit best, as a rule Windows-1252."""
+    """By the byte order mark; else UTF-8 if the whole file is, else the one whose letters fit best, as a rule Windows-1252.
+
+    Raises `Unusable` for names in letters of East Asia.
+    """
     decoder = codecs.getincrementaldecoder("utf-8")()
     with path.open("rb") as file:
         start = file.read(4)
@@ -151,9 +154,19 @@ def encoding_of(path: Path) -> str:
                 decoder.decode(block)
             decoder.decode(b"", final=True)
         except UnicodeDecodeError:
-            guessed = delimited.letters_of(path)
-            return "cp1252" if guessed == "utf-8" else guessed
+            file.seek(0)
+            return _letters_of(file.read(delimited.LOOKED_AT))
     return "utf-8-sig"
+
+
+def _letters_of(beginning: bytes) -> str:
+    """The encoding that fits the names of parts and characteristics, else all letters: graphics (K50..) are bytes of any kind."""
+    lines = [line for line in beginning.splitlines() if not line.startswith(b"K5")]
+    names = b"\n".join(line for line in lines if line.startswith((b"K1", b"K2")))
+    name, european = letters.guessed(b"\n".join(lines) if names.isascii() else names)
+    if not european and not names.isascii():
+        raise Unusable(delimited.not_european())
+    return name
 
 
 def open_text(path: Path, encoding: str) -> TextIO:

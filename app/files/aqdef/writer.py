@@ -18,6 +18,7 @@ from app.core.natural import NaturalLimit
 from app.files.aqdef.description import encoding_of
 from app.files.aqdef.fields import CATALOGUES, Catalogue, most_of
 from app.files.aqdef.values import OF_CHARACTERISTIC, OF_FIELD
+from app.files.formats.delimited import Unusable
 from app.language.i18n import _
 
 MISSING = 255
@@ -192,11 +193,10 @@ def _settle_encoding(path: Path) -> None:
         return
     try:
         path.write_bytes(content.decode().encode("cp1252"))
-    except UnicodeEncodeError:
-        pass
-    else:
         if encoding_of(path) == "cp1252":
             return
+    except (UnicodeEncodeError, Unusable):  # no such letters, or none that would be known again
+        pass
     path.write_bytes(b"\xef\xbb\xbf" + content)
 
 

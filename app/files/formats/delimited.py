@@ -7,7 +7,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 from typing import NamedTuple, TextIO
 
-from app.files.formats import dimension_blocks
+from app.files.formats import dimension_blocks, letters
 from app.language.i18n import _
 
 DELIMITERS = (";", "\t", ",", "|")
@@ -27,6 +27,8 @@ ENCODINGS = (
     "cp1253",
     "cp1254",
     "cp1257",
+    "cp850",
+    "cp852",
     "cp866",
     "cp932",
     "gb18030",
@@ -38,16 +40,6 @@ SAMPLE = 64 * 1024
 AT_ONCE = 30  # lines that are compared
 LOOKED_AT = 1_000_000  # bytes from which an encoding is guessed
 _IN_QUOTES = str.maketrans(";\t,|\r\n", "  .   ")  # signs that part nothing there; a comma may be of a number
-_SIGNS_OF_ALL = "°±µ²³×·–—„“”‚‘’…€§«»\N{NO-BREAK SPACE}"
-_LATIN = "äöüÄÖÜß" + _SIGNS_OF_ALL
-# The common letters of German, of Serbian and Slovene, and of Cyrillic; rare ones would only confuse.
-LETTERS = {
-    "cp1252": _LATIN + "Øø",
-    "cp1250": _LATIN + "čćšžđČĆŠŽĐ",
-    "iso-8859-2": _LATIN + "čćšžđČĆŠŽĐ",
-    "cp1251": "аеионрстлвкмдпузбјљњжчцшћђАВДИКМНОПРСТ" + _SIGNS_OF_ALL,
-    "iso-8859-5": "аеионрстлвкмдпузбјљњжчцшћђАВДИКМНОПРСТ",
-}
 _MARKS = ((codecs.BOM_UTF8, "utf-8-sig"), (codecs.BOM_UTF16_LE, "utf-16"), (codecs.BOM_UTF16_BE, "utf-16"))
 # Full-width signs too, which some spreadsheets take for the plain ones. A sign behind another delimiter begins a cell where
 # the spreadsheet of another country parts the line there; a plain number does no harm there.
@@ -84,20 +76,20 @@ def encoding_of(path: Path) -> str:
 
 
 def letters_of(path: Path) -> str:
-    """Encoding of a text in single bytes: UTF-8 if the beginning is, else the one whose letters fit best."""
+    """Encoding of a text in single bytes: UTF-8 if the beginning is, else the one whose letters fit best.
+
+    Raises `Unusable` for letters of East Asia: those are not guessed.
+    """
     with path.open("rb") as file:
         start = file.read(LOOKED_AT)
     try:
         codecs.getincrementaldecoder("utf-8")().decode(start)
     except UnicodeDecodeError:
-        return max(LETTERS, key=lambda name: _fit(start, name))
+        name, european = letters.guessed(start)
+        if not european:
+            raise Unusable(not_european()) from None
+        return name
     return "utf-8"
-
-
-def _fit(content: bytes, encoding: str) -> int:
-    """Letters that the languages of the encoding have, less those that they do not have."""
-    characters = [character for character in content.decode(encoding, "replace") if character > "\x7f"]
-    return sum(1 if character in LETTERS[encoding] else -1 for character in characters)
 
 
 def samples(path: Path) -> list[tuple[str, list[str]]]:
@@ -106,7 +98,10 @@ def samples(path: Path) -> list[tuple[str, list[str]]]:
         start = file.read(LOOKED_AT)
     beginning = [line for line in start.splitlines() if line.strip()][:200]
     telling = ([line for line in beginning if any(byte > 0x7F for byte in line)] or beginning)[:3]
-    return [(name, [line.decode(name, "replace")[:120] for line in telling]) for name in ("utf-8", *LETTERS)]
+    return [
+        (name, [line.decode(name, "replace")[:120] for line in telling])
+        for name in ("utf-8", *letters.LETTERS, *letters.TO_NAME)
+    ]
 
 
 def open_text(path: Path, encoding: str) -> TextIO:
@@ -284,6 +279,14 @@ def _not_text(encoding: str) -> str:
         "This is not {encoding} text. Name the file's encoding: cp1250 for Serbian (Latin), Slovene and other Central "
         "European Windows files, cp1251 for Cyrillic, cp1252 for Western European."
     ).format(encoding=encoding.upper())
+
+
+def not_european() -> str:
+    """The refusal of letters that are not guessed."""
+    return _(
+        "The letters look like those of East Asia, and which ones they are is not guessed. Name the encoding (--encoding, in a "
+        "bridge encoding): cp932 for Japanese, gb18030 for Chinese, big5 for Chinese of Taiwan, cp949 for Korean."
+    )
 
 
 def _why(error: str) -> str:

@@ -181,7 +181,8 @@ def _aqdef_preview(
     request: Request, upload: Upload, said: Mapping[str, str], characteristic: str, *, status: int
 ) -> Response:
     form = aqdef_form.look(_database(request), upload, said, characteristic)
-    return page(request, "imports/aqdef.html", status=status, upload=upload, form=form, back="/import")
+    how: dict[str, Any] = {"upload": upload, "form": form, "encodings": _encodings(), "back": "/import"}
+    return page(request, "imports/aqdef.html", status=status, **how)
 
 
 def _wide_preview(request: Request, upload: Upload, said: Mapping[str, str], *, status: int) -> Response:
@@ -266,11 +267,15 @@ def _page(
         said={name: said.get(name, "") for name in HOW},
         fields=_fields(layout, wide=to is None) if layout else [],
         sheets=[(name, name) for name in upload.sheets],
-        encodings=[("", _("automatic")), *((name, name) for name in ENCODINGS)],
+        encodings=_encodings(),
         samples=delimited.samples(upload.path) if layout is None else [],
         back=address("/import", characteristic=to.characteristic.key if to else None),
         **more,
     )
+
+
+def _encodings() -> list[tuple[str, str]]:
+    return [("", _("automatic")), *((name, name) for name in ENCODINGS)]
 
 
 def _wishes(said: Mapping[str, str]) -> Wishes:
