@@ -78,7 +78,7 @@ def import_file(
         dry_run=dry_run,
         progress=progress,
     )
-    _sum_up(outcome, dry_run=dry_run)
+    _sum_up(outcome, found, dry_run=dry_run)
     return outcome
 
 
@@ -107,8 +107,9 @@ def _tell(found: "list[Content]", chosen: dict[int, str], encoding: str) -> None
         if each.obstacle:
             say(_("{title}: left out: {reason}.").format(title=each.title, reason=each.obstacle), style="yellow")
             continue
-        if key is None:
+        if not key:
             reason = each.not_new or _("nothing of its part here has its number or name; --map or --create-missing")
+            reason = reason if key is None else _("--map says so")
             say(_("{title}: left out: {reason}.").format(title=each.title, reason=reason), style="yellow")
             continue
         say(f"{each.title} → {key}" if key != NEW else each.title + " → " + _("to be set up"))
@@ -116,9 +117,13 @@ def _tell(found: "list[Content]", chosen: dict[int, str], encoding: str) -> None
             say(f"  {remark}")
 
 
-def _sum_up(outcome: "Outcome", *, dry_run: bool) -> None:
+def _sum_up(outcome: "Outcome", found: "list[Content]", *, dry_run: bool) -> None:
+    from app.loop.readings.aqdef.matching import leaving_out
+
     for each in sorted(outcome.results, key=lambda each: each.trouble is None):  # the reason of a refusal first
         _result(each, dry_run=dry_run)
+    if bad := outcome.refused:
+        say(_("To import the others: --map '{argument}'").format(argument=leaving_out(bad, found)), style="bold red")
     for remark in outcome.remarks:
         say(remark, style="yellow")
     if not any(each.trouble for each in outcome.results):

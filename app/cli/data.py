@@ -70,7 +70,7 @@ Mapping = Annotated[
         "--map",
         envvar="INBAND_MAP",
         help="Which column is what: measured=Wert,measured_at=Datum+Uhrzeit. A column is named, or numbered from 1; measured_at= says that none is. "
-        "Of AQDEF, which characteristic is which: D40=shaft-d40; D41=+ sets it up.",
+        "Of AQDEF, which characteristic is which: D40=shaft-d40; D41=+ sets it up, D42= leaves it out.",
         show_default="by their names, in five languages",
     ),
 ]

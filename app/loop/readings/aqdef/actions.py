@@ -1,5 +1,6 @@
 """Import of an AQDEF file: all of it or nothing, as history of each characteristic (decision 15)."""
 
+import re
 import unicodedata
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
@@ -27,7 +28,7 @@ from app.loop.readings.aqdef import matching
 from app.loop.readings.aqdef.content import Readings, put_down
 from app.loop.readings.aqdef.matching import NEW, Content
 from app.loop.readings.aqdef.queries import count_alike, remembered
-from app.loop.readings.aqdef.sorting import Wishes, described
+from app.loop.readings.aqdef.sorting import Sorted, Wishes, described
 from app.loop.readings.importing.cells import Flaw
 from app.loop.readings.importing.history import Flawed, Summary, store_history
 from app.loop.readings.records import Entry
@@ -71,6 +72,12 @@ class Outcome:
     def repeated(self) -> int:
         """Readings that were there."""
         return sum(each.summary.repeated for each in self.results if each.summary)
+
+    @property
+    def refused(self) -> list[Content]:
+        """Characteristics that cannot be imported, where others can."""
+        bad = [each.content for each in self.results if each.trouble is not None]
+        return bad if len(bad) < len(self.results) else []
 
 
 def describe(source: Source, *, foreign: bool = False) -> Description:
@@ -127,10 +134,11 @@ def import_aqdef(
 ) -> Outcome:
     """Import the characteristics that are chosen, in one transaction.
 
-    chosen: the key of the characteristic here for each index of the file, or `NEW` to set it up on the machine. dry_run: say
-    what would happen, for each also what stands against it. foreign: read in a process of its own. Raises `Invalid`, `Flawed`, `NotFound` and `Conflict`.
+    chosen: the key of the characteristic here for each index of the file, `NEW` to set it up on the machine, or nothing to leave
+    it out. dry_run: say what would happen, for each also what stands against it. foreign: read in a process of its own. Raises `Invalid`, `Flawed`, `NotFound` and `Conflict`.
     """
     found = {each.index: each for each in matching.contents(description, wishes.unit)}
+    chosen = {index: key for index, key in chosen.items() if key}
     _refuse(chosen, found)
     wanted = {index: found[index] for index in chosen}
     outcome = Outcome()
@@ -141,7 +149,7 @@ def import_aqdef(
         ):
             found_there = readings.found
             if found_there.flaws:
-                raise Flawed(found_there.flaws, found_there.flaw_count)
+                raise _flawed(found_there, wanted, list(found.values()))
             if not found_there.counted.total() and (missing := found_there.missing.total()):
                 raise Invalid.at(
                     "file",
@@ -160,15 +168,49 @@ def import_aqdef(
             if dry_run:
                 session.rollback()
                 return outcome
-            for each in outcome.results:
-                if each.trouble is not None:
-                    each.trouble.detail = f"{each.key}: {each.trouble.detail}"
-                    raise each.trouble
+            if refused := [each for each in outcome.results if each.trouble is not None]:
+                raise _refusal(refused, wanted, list(found.values()))
             _remember(session, outcome.results, actor)
             session.commit()
     except Unusable as error:
         raise _unusable(error) from None
     return outcome
+
+
+def _flawed(there: Sorted, wanted: Mapping[int, Content], found: Sequence[Content]) -> Flawed:
+    """The refusal of lines that are wrong."""
+    refusal = Flawed(there.flaws, there.flaw_count)
+    named = [re.fullmatch(r"K\d{4}/(\d+)", flaw.column) for flaw in there.flaws]
+    indices = {int(match[1]) if match else None for match in named}
+    if there.flaw_count == len(there.flaws) and indices <= wanted.keys():
+        _say_how_others_go(refusal, [wanted[index] for index in wanted if index in indices], wanted, found)
+    return refusal
+
+
+def _refusal(refused: Sequence[Result], wanted: Mapping[int, Content], found: Sequence[Content]) -> InbandError:
+    """The first trouble, with the words of all of them."""
+    troubles = [each.trouble for each in refused if each.trouble is not None]
+    first = next((each for each in troubles if not isinstance(each, Flawed)), troubles[0])
+    words = " ".join(f"{each.key}: {each.trouble.detail}" for each in refused if each.trouble is not None)
+    if isinstance(first, Flawed):
+        first.flaws = [flaw for each in refused for flaw in each.flaws]
+        first.count = sum(each.count for each in troubles if isinstance(each, Flawed))
+    first.errors = [error for each in troubles for error in each.errors]
+    first.detail = words
+    _say_how_others_go(first, [each.content for each in refused], wanted, found)
+    return first
+
+
+def _say_how_others_go(
+    refusal: InbandError, some: Sequence[Content], wanted: Mapping[int, Content], found: Sequence[Content]
+) -> None:
+    """Add to the advice how the characteristics that are not these are imported, if there are any."""
+    if others := len(wanted) - len(some):
+        text = _(
+            "To import the other {count}, leave out what cannot be: --map '{argument}' (on the page: an empty field here)."
+        )
+        text = text.format(count=others, argument=matching.leaving_out(some, found))
+        refusal.what_to_do = " ".join(filter(None, (refusal.what_to_do, text)))
 
 
 def _refuse(chosen: Mapping[int, str], found: Mapping[int, Content]) -> None:

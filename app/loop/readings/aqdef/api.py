@@ -88,7 +88,7 @@ class AqdefIn(Body):
             default_factory=dict,
             max_length=10_000,
             description="By number (K2001) or name (K2002), before it the part (K1001) and a colon if need be: the key of the "
-            "characteristic here, or + to set it up. Those that are remembered, or of the same number or name, may be left out.",
+            "characteristic here, + to set it up, or nothing to leave it out. Those that are remembered, or of the same number or name, may be left out.",
         ),
     ]
     create_missing: Annotated[bool, Field(strict=True, description="Set up all that are not here yet.")] = False
@@ -173,7 +173,7 @@ def import_aqdef(request: Request, session: SessionDep, caller: Engineer, given:
     return AqdefResult(
         stored=outcome.stored,
         repeated=outcome.repeated,
-        characteristics=[_result(each, results.get(each.index)) for each in found],
+        characteristics=[_result(each, results.get(each.index), chosen.get(each.index)) for each in found],
         notes=outcome.remarks,
     )
 
@@ -203,7 +203,7 @@ def _chosen(guessed: dict[int, str], given: AqdefIn, found: list[Content]) -> di
     return actions.with_missing(chosen, found) if given.create_missing else chosen
 
 
-def _result(content: Content, result: Result | None) -> AqdefCharacteristic:
+def _result(content: Content, result: Result | None, said: str | None) -> AqdefCharacteristic:
     made = AqdefCharacteristic(
         index=content.index,
         part=content.part or content.part_name,
@@ -215,6 +215,7 @@ def _result(content: Content, result: Result | None) -> AqdefCharacteristic:
         made.left_out = (
             content.obstacle
             or content.not_new
+            or (_("characteristics says so") if said == "" else "")
             or _("nothing of its part here has its number or name; name it under characteristics")
         )
         return made

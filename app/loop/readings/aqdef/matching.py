@@ -325,31 +325,25 @@ def doubts(content: Content, parameters: Parameters) -> list[str]:
 
 
 def said(text: str, found: Sequence[Content]) -> dict[int, str]:
-    """Choices out of a text: `D40=shaft-d40,Part:L12=+`: number, name or index of a characteristic, before it the part if need be.
+    """Choices out of a text: `D40=shaft-d40,Part:L12=+,D41=`: number, name or index of a characteristic, before it the part if need be.
 
-    Raises `ValueError` with a sentence.
+    Nothing behind the sign leaves it out. Raises `ValueError` with a sentence.
     """
     pairs: list[tuple[str, str]] = []
     for pair in filter(None, (each.strip() for each in text.split(","))):
         name, sign, key = (each.strip() for each in pair.rpartition("="))
-        if not sign or not name or not key:
-            raise ValueError(_("Write it as D40=shaft-d40, or D40=+ to set it up."))
+        if not sign or not name:
+            raise ValueError(_("Write it as D40=shaft-d40, as D40=+ to set it up, or as D40= to leave it out."))
         pairs.append((name, key))
     return named(pairs, found)
 
 
 def named(pairs: Iterable[tuple[str, str]], found: Sequence[Content]) -> dict[int, str]:
     """Choices out of pairs of a name in the file, as `said` has it, and a key. Raises `ValueError` with a sentence."""
-    # By number and name, alone and with the part before it.
-    alone: dict[str, dict[int, Content]] = {str(each.index): {each.index: each} for each in found}
-    named_so: dict[str, dict[int, Content]] = {}
-    for each in found:
-        for word in (each.number, each.name):
-            for called in (word, f"{each.part}:{word}", f"{each.part_name}:{word}"):
-                named_so.setdefault(called, {})[each.index] = each
+    called = _called(found)
     chosen: dict[int, str] = {}
     for name, key in pairs:
-        fitting = list((named_so.get(name) or alone.get(name) or {}).values())
+        fitting = called.get(name, [])
         if len(fitting) != 1:
             there = ", ".join(each.title for each in found[:20])
             reason = (
@@ -360,3 +354,25 @@ def named(pairs: Iterable[tuple[str, str]], found: Sequence[Content]) -> dict[in
             raise ValueError(reason.format(name=name, there=there, count=len(fitting)))
         chosen[fitting[0].index] = key
     return chosen
+
+
+def leaving_out(some: Iterable[Content], found: Sequence[Content]) -> str:
+    """The argument that leaves these characteristics of the file out, as `said` reads it."""
+    called = _called(found)
+
+    def plain(each: Content) -> str:
+        words = (each.number, each.name, f"{each.part}:{each.number}", f"{each.part}:{each.name}")
+        fitting = (word for word in words if called.get(word) == [each] and not set(word) & {",", '"'})
+        return next(fitting, str(each.index))
+
+    return ",".join(f"{plain(each)}=" for each in some)
+
+
+def _called(found: Sequence[Content]) -> dict[str, list[Content]]:
+    """The characteristics by number and name, alone and with the part before it; where nothing is called so by index."""
+    named_so: dict[str, dict[int, Content]] = {}
+    for each in found:
+        for word in (each.number, each.name):
+            for called in (word, f"{each.part}:{word}", f"{each.part_name}:{word}"):
+                named_so.setdefault(called, {})[each.index] = each
+    return {str(each.index): [each] for each in found} | {word: list(each.values()) for word, each in named_so.items()}
