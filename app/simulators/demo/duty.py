@@ -1,6 +1,7 @@
-"""The group that is on duty by shifts in the demonstration plant, and its days off."""
+"""The group that is on duty by shifts in the demonstration plant, its days off, and maintenance of its machines."""
 
-from datetime import UTC, datetime
+from collections.abc import Sequence
+from datetime import UTC, datetime, timedelta
 
 from inband_client import Client
 
@@ -8,14 +9,25 @@ NAME = "Setters"
 SHIFTS = {"06:00": "operator", "14:00": "engineer", "22:00": "admin"}  # who, by the beginning of the shift
 
 
-def set_up(admin: Client) -> None:
-    """Days off and the group, as far as they are not there."""
+def set_up(admin: Client, machines: Sequence[str]) -> None:
+    """Days off, the group, and maintenance, as far as they are not there."""
     calendar = admin.get("/notifications/calendar")
     if calendar["country"] is None and not calendar["days"]:
         year = datetime.now(UTC).year
         own = [f"{year}-12-24", f"{year}-12-31"]
         admin.call("PUT", "/notifications/calendar", json={"country": "DE", "subdivision": "BY", "days": own})
     group(admin)
+    if machines and not admin.get("/maintenance")["items"]:
+        _maintenance(admin, machines)
+
+
+def _maintenance(admin: Client, machines: Sequence[str]) -> None:
+    """Of the first machine it is over, of the last one it is planned: tomorrow, a shift long."""
+    over = admin.post("/maintenance", {"machine": machines[0], "reason": "Coolant changed"})
+    admin.post(f"/maintenance/{over['id']}/end", {"reason": "Done"})
+    begins = datetime.now(UTC).replace(hour=6, minute=0, second=0, microsecond=0) + timedelta(days=1)
+    times = {"begins": begins.isoformat(), "ends": (begins + timedelta(hours=8)).isoformat()}
+    admin.post("/maintenance", {"machine": machines[-1], "reason": "Spindle bearing is replaced"} | times)
 
 
 def group(admin: Client) -> int | None:

@@ -77,7 +77,7 @@ def lines(
         gateway = client(new_key(admin, f"/machines/{spec.key}/keys", {"name": KEY_NAME}))
         rng = Random(f"{seed}:{spec.key}:operator")
         simulated.append(Line(Machine(spec, seed), gateway, operator, run, rng, ending, causes))
-    duty.set_up(admin)
+    duty.set_up(admin, [spec.key for spec in machines])
     andon.start(admin)
     admin.close()
     return simulated

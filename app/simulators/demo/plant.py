@@ -49,6 +49,7 @@ class Feature:
     plan: dict[str, Any] = field(default_factory=dict)  # how often it is measured
     expansion: dict[str, float] = field(default_factory=dict)  # of the part; its readings then carry its temperature
     by_nest: tuple[float, ...] = ()  # how far it lies off in each nest of the fixture
+    clean: bool = False  # no chip and no drop of coolant gets under the stylus here
     skipped: tuple[int, int] = (0, 0)  # from this live part on until before that one the probe is switched off
 
     @property
@@ -86,6 +87,7 @@ class Tool:
     wear: float  # recession of the edge per part
     run_in: float  # recession within the first parts of a fresh edge
     life: int  # parts until it is changed as a matter of routine
+    chips: bool = True
 
 
 @dataclass(frozen=True)
@@ -190,6 +192,7 @@ MILL_1 = Machine(
         Tool(11, "end mill Ø12, pocket", wear=0.000_035, run_in=0.003, life=430),
         Tool(12, "end mill Ø16, web", wear=0.000_03, run_in=0.002, life=480),
         Tool(14, "end mill Ø10, bore", wear=0.000_03, run_in=0.002, life=510),
+        Tool(15, "face mill Ø50", wear=0.000_001, run_in=0.0005, life=2_500, chips=False),
     ),
     features=(
         Feature(
@@ -208,6 +211,11 @@ MILL_1 = Machine(
             average_memory=14, weighting_factor=1, zero_range=0.0003, scatter=0.0014, warmth=-0.0015,
             touches=(4, 1), shape=(0.0012, -0.0009, 0.0006, -0.0009),
             more={"variant": "round", "index": 90, "feature": "inside"},
+        ),
+        Feature(  # So stable and so capable that not every part has to be measured: sampling is proposed.
+            "plate-h12", "Plate thickness 12", 15, LENGTH, 12.0, 0.08, -0.08, factor=-1,
+            average_memory=15, zero_range=0.03, scatter=0.006, clean=True,
+            more={"axis": "Z", "direction": "negative", "averaging_limit": 0.05},
         ),
     ),
     first_chip=(110, 11),

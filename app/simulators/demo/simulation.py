@@ -196,7 +196,8 @@ class Machine:
         if self.live_parts == early:
             self._chip(self.edges[tool], how_far)
         elif chip < CHIP_RATE:
-            self._chip(list(self.edges.values())[int(which * len(self.edges))], how_far)
+            brittle = [edge for edge in self.edges.values() if edge.tool.chips]
+            self._chip(brittle[int(which * len(brittle))], how_far)
         elif dirt < DIRT_RATE:
             self.dirt = 1.2 + how_far
 
@@ -207,7 +208,7 @@ class Machine:
     def _probe(self, at: int, feature: plant.Feature, part: Part) -> Probe:
         outlier, sign = self._probing.random(), self._probing.choice((-1, 1))
         size = part.sizes[feature.key] + self.dirt
-        if outlier < OUTLIER_RATE:  # a chip or a drop of coolant under the stylus, once
+        if outlier < OUTLIER_RATE and not feature.clean:  # a chip or a drop of coolant under the stylus, once
             size += sign * feature.scatter * 6
         touches = None
         if feature.touches:
