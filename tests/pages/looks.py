@@ -147,7 +147,7 @@ SMALL = """(least) => {
   };
   const small = [];
   for (const at of document.querySelectorAll(REACTS)) {
-    if (!at.checkVisibility({ visibilityProperty: true, opacityProperty: false }) || at.disabled || at.closest(".skip-link") || inSentence(at)) continue;
+    if (!at.checkVisibility({ visibilityProperty: true, opacityProperty: false }) || at.disabled || at.closest(".skip-link, [aria-hidden=true]") || inSentence(at)) continue;
     const { width, height } = boxOf(at);
     const wanted = at.matches("[data-term]") && innerWidth > 1100 ? 24 : least;
     if (Math.round(width) < wanted || Math.round(height) < wanted)
