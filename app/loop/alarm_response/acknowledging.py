@@ -206,7 +206,9 @@ def _keep_cutting(session: Session, row: AlarmRow, comment: str, caller: Caller)
         if denied:
             outcome.append({"code": "readings_disagree"})
     elif row.held is not None:
-        released = tool_actions.decide(session, row.machine, row.held.number, "release", comment, caller).correction
+        released = tool_actions.decide(
+            session, row.machine, row.held.number, tool_actions.RELEASE, comment, caller
+        ).correction
         outcome.append({"code": "correction_released", "number": released.number, "amount": released.amount})
     elif row.alarm.kind == TOOL_WORN.name:
         outcome.append({"code": "nothing_held"})
@@ -319,7 +321,7 @@ def _false_reading(session: Session, row: AlarmRow, comment: str, caller: Caller
 def _withdraw(session: Session, row: AlarmRow, correction: Correction, comment: str, caller: Caller) -> dict[str, Any]:
     if correction.status == "applied":
         return {"code": "correction_applied", "number": correction.number, "amount": correction.amount}
-    tool_actions.decide(session, row.machine, correction.number, "rejected", comment, caller)
+    tool_actions.decide(session, row.machine, correction.number, tool_actions.REJECT, comment, caller)
     return {"code": "correction_withdrawn", "number": correction.number, "amount": correction.amount}
 
 

@@ -34,10 +34,19 @@ from app.loop.tools import queries, wording
 from app.loop.tools.alarm_kinds import PAUSING
 from app.loop.tools.events import average_changed, tool_changed
 
-Verb = Literal["rejected", "approve", "release"]
-FROM: dict[str, tuple[str, ...]] = {"rejected": OPEN, "approve": ("awaiting_approval",), "release": ("held",)}
-INTO = {"rejected": "rejected", "approve": "pending", "release": "pending"}
-SAID = {"rejected": "correction rejected", "approve": "correction approved", "release": "correction released"}
+
+class Decision(NamedTuple):
+    """A decision of a person about a correction: the statuses that permit it, the one it leads to, its name in the record."""
+
+    verb: str
+    of: tuple[str, ...]
+    into: str
+    recorded: str
+
+
+REJECT = Decision("rejected", OPEN, "rejected", "correction rejected")
+APPROVE = Decision("approve", ("awaiting_approval",), "pending", "correction approved")
+RELEASE = Decision("release", ("held",), "pending", "correction released")
 
 
 class Decided(NamedTuple):
@@ -60,7 +69,7 @@ def decide(
     session: Session,
     machine: Machine,
     number: int,
-    verb: Verb,
+    decision: Decision,
     reason: str,
     caller: Caller,
     *,
@@ -72,15 +81,15 @@ def decide(
     the world and its rejection was not demanded nevertheless.
     """
     correction = locked(session, machine, number)
-    must_be(correction, machine, verb, FROM[verb])
-    if verb == "rejected" and correction.fetched_at is not None and not although_fetched:
+    must_be(correction, machine, decision.verb, decision.of)
+    if decision is REJECT and correction.fetched_at is not None and not although_fetched:
         raise Conflict(
             wording.is_out(correction),
             _("Take the text back and make sure that it was not run; then reject it with although_fetched = true."),
             correction_status=correction.status,
             fetched_at=correction.fetched_at.isoformat(),
         )
-    if verb == "release" and _disproved(session, correction):
+    if decision is RELEASE and _disproved(session, correction):
         raise Conflict(
             _(
                 "Parts measured since lie within the wear limit again: {number} of {amount} mm would spoil the next one."
@@ -89,14 +98,11 @@ def decide(
             correction_status=correction.status,
         )
     before = correction.status
-    correction.status, correction.reason = INTO[verb], reason
-    correction.decided_at, correction.decided_by = datetime.now(UTC), caller.name
-    record_status(session, machine, correction, caller, SAID[verb], before, reason)
-    publish(session, correction_changed(session, machine, correction))
+    _carry_out(session, machine, [correction], decision, reason, caller)
     if before == "held":
         alarm = _wear_alarm(session, correction)
         return Decided(correction, None if alarm is None else wording.still_active(alarm))
-    counting = queries.counting_on(session, machine, correction) if verb == "rejected" else []
+    counting = queries.counting_on(session, machine, correction) if decision is REJECT else []
     notes = [wording.counted_on(counting), wording.is_out(correction) if correction.fetched_at else None]
     return Decided(correction, " ".join(filter(None, notes)) or None)
 
@@ -111,14 +117,25 @@ def approve_all(
     lock_machines(session, [machine.id])
     approved = [queries.correction(session, machine, number) for number in sorted(set(numbers))]
     for correction in approved:
-        must_be(correction, machine, "approve", FROM["approve"])
-    now = datetime.now(UTC)
-    for correction in approved:
-        correction.status, correction.reason = INTO["approve"], reason
-        correction.decided_at, correction.decided_by = now, caller.name
-        record_status(session, machine, correction, caller, SAID["approve"], "awaiting_approval", reason)
-    publish(session, *(correction_changed(session, machine, correction) for correction in approved))
+        must_be(correction, machine, APPROVE.verb, APPROVE.of)
+    _carry_out(session, machine, approved, APPROVE, reason, caller)
     return approved
+
+
+def _carry_out(
+    session: Session,
+    machine: Machine,
+    corrections: Sequence[Correction],
+    decision: Decision,
+    reason: str,
+    caller: Caller,
+) -> None:
+    now = datetime.now(UTC)
+    for correction in corrections:
+        before, correction.status, correction.reason = correction.status, decision.into, reason
+        correction.decided_at, correction.decided_by = now, caller.name
+        record_status(session, machine, correction, caller, decision.recorded, before, reason)
+    publish(session, *(correction_changed(session, machine, correction) for correction in corrections))
 
 
 def edit_tool(session: Session, machine: Machine, number: int, offset: float, reason: str, caller: Caller) -> Restarted:

@@ -13,7 +13,7 @@ from app.language.numbers import mm, read_um, typed_length, um
 from app.loop.characteristics.correction_queries import open_corrections
 from app.loop.tables.machines import Machine
 from app.loop.tools import actions, applying, queries, sister_actions, wording
-from app.loop.tools.actions import Decided
+from app.loop.tools.actions import APPROVE, REJECT, RELEASE, Decided, Decision
 from app.loop.tools.edge_schemas import SisterIn
 from app.loop.tools.queries import AverageRow, CorrectionRow, ToolRow
 from app.loop.tools.schemas import (
@@ -116,7 +116,7 @@ def reject_correction(on: OfCorrection, decision: RejectionIn) -> Decided:
         on.session,
         on.machine,
         on.number,
-        "rejected",
+        REJECT,
         decision.reason,
         on.caller,
         although_fetched=decision.although_fetched,
@@ -125,20 +125,20 @@ def reject_correction(on: OfCorrection, decision: RejectionIn) -> Decided:
 
 def approve_correction(on: OfCorrection, decision: CorrectionDecisionIn) -> Decided:
     """A person approves a correction that awaits it; the machine may apply it then."""
-    return actions.decide(on.session, on.machine, on.number, "approve", decision.reason, on.caller)
+    return actions.decide(on.session, on.machine, on.number, APPROVE, decision.reason, on.caller)
 
 
 def release_correction(on: OfCorrection, decision: CorrectionDecisionIn) -> Decided:
     """A person releases a held correction; the machine may apply it then. Its alarm stays until it is acknowledged."""
-    return actions.decide(on.session, on.machine, on.number, "release", decision.reason, on.caller)
+    return actions.decide(on.session, on.machine, on.number, RELEASE, decision.reason, on.caller)
 
 
-def _decided_so(status: str) -> Any:
+def _decided_so(decision: Decision) -> Any:
     """After a `Conflict`: tells if the caller had decided the same before."""
 
     def own(on: OfCorrection) -> bool:
         correction = on.row.correction
-        return bool(correction.decided_by == on.caller.name and correction.status == status)
+        return bool(correction.decided_by == on.caller.name and correction.status == decision.into)
 
     return own
 
@@ -164,11 +164,11 @@ def _offset_shown(on: OfCorrection) -> Size:
 
 CORRECTION: tuple[Verb[OfCorrection, Any], ...] = (
     Verb(
-        name="release",
-        when=("held",),
+        name=RELEASE.verb,
+        when=RELEASE.of,
         body=CorrectionDecisionIn,
         act=release_correction,
-        own=_decided_so("pending"),
+        own=_decided_so(RELEASE),
         word=lambda: _("Release"),
         title=lambda _on: _("Release correction {number}?"),
         follows=lambda on: [
@@ -179,11 +179,11 @@ CORRECTION: tuple[Verb[OfCorrection, Any], ...] = (
         said=lambda: _("Correction {n} is released; it waits for the machine."),
     ),
     Verb(
-        name="approve",
-        when=("awaiting_approval",),
+        name=APPROVE.verb,
+        when=APPROVE.of,
         body=CorrectionDecisionIn,
         act=approve_correction,
-        own=_decided_so("pending"),
+        own=_decided_so(APPROVE),
         word=lambda: _("Approve"),
         title=lambda _on: _("Approve correction {number}?"),
         follows=lambda on: [_to_machine(on)],
@@ -208,12 +208,12 @@ CORRECTION: tuple[Verb[OfCorrection, Any], ...] = (
         said=lambda: _("Correction {n} is applied."),
     ),
     Verb(
-        name="rejected",
-        when=("held", "awaiting_approval", "pending"),
+        name=REJECT.verb,
+        when=REJECT.of,
         body=RejectionIn,
         act=reject_correction,
         by_machine=True,
-        own=_decided_so("rejected"),
+        own=_decided_so(REJECT),
         asks_again=lambda error: "fetched_at" in error.more,
         word=lambda: _("Reject"),
         title=lambda _on: _("Reject correction {number}?"),

@@ -133,9 +133,9 @@ def _instead(correction: Correction, verb: str) -> str:
     if closed:
         return _("There is nothing left to do: the next reading asks for a new correction if one is needed.")
     return {
-        "pending": _("It needs no release. Reject it if it must not be applied."),
-        "held": _("It is released, not approved: its alarm asks an operator."),
-        "awaiting_approval": _("It is approved, not released: it is not held."),
+        "pending": _("Leave it to the machine, or reject it if it must not be applied."),
+        "held": _("Acknowledge its alarm, or release or reject it here."),
+        "awaiting_approval": _("Approve or reject it."),
     }.get(correction.status, "")
 
 
