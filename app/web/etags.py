@@ -44,6 +44,11 @@ _IfMatch = Annotated[
 ]
 
 
+def held(find: Callable[..., object], name: str) -> Lock:
+    """Holds what the parameter of this name names: `find` finds it, and with ``hold=True`` holds it."""
+    return lambda session, given: find(session, given[name], hold=True)
+
+
 def tag_of(answer: BaseModel) -> str:
     """The entity tag of a resource as it is answered. Warnings are about a request and do not count."""
     return f'"{sha256(answer.model_dump_json(exclude={"warnings"}).encode()).hexdigest()[:32]}"'

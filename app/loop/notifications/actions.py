@@ -241,7 +241,7 @@ def set_own(session: Session, given: OwnAddressIn, caller: Caller, settings: Set
 
 def delete_own(session: Session, caller: Caller) -> None:
     """Forget where the caller gets mail. Raises `NotFound`, and `Conflict` as `delete_receiver`."""
-    row = queries.own(session, caller.person_id) if caller.person_id is not None else None
+    row = queries.own(session, caller.person_id)
     if row is None:
         raise NotFound(_("You have given no mail address."), _("There is nothing to delete."))
     delete_receiver(session, row.id, caller)

@@ -28,7 +28,7 @@ from app.loop.notifications.schemas import (
 )
 from app.web.api import After, Before, Limit, api_router, problems
 from app.web.deps import SessionDep, SettingsDep
-from app.web.etags import TAGGED, guarded, tagged
+from app.web.etags import TAGGED, guarded, held, tagged
 from app.web.fields import LARGEST_ID, Page, page_of
 
 router = api_router("notifications")
@@ -62,7 +62,7 @@ def get_notification_route(session: SessionDep, route: RouteId) -> RouteOut:
 
 
 @router.put("/notifications/routes/{route}", responses=problems(404, 412))
-@guarded(get_notification_route, queries.hold_route)
+@guarded(get_notification_route, held(queries.route, "route"))
 def change_notification_route(session: SessionDep, caller: Admin, route: RouteId, given: RouteIn) -> RouteOut:
     """Replace a route. What was announced already stays announced."""
     return RouteOut.of(actions.change_route(session, route, given, caller))
@@ -100,7 +100,7 @@ def get_receiver(session: SessionDep, receiver: ReceiverId) -> ReceiverOut:
 
 
 @router.patch("/notifications/receivers/{receiver}", responses=problems(404, 412))
-@guarded(get_receiver, queries.hold_receiver)
+@guarded(get_receiver, held(queries.receiver, "receiver"))
 def change_receiver(
     session: SessionDep, caller: Admin, settings: SettingsDep, receiver: ReceiverId, change: ReceiverChange
 ) -> ReceiverOut:
@@ -150,7 +150,7 @@ def get_who_is_on_duty(session: SessionDep, group: GroupId) -> DutyOut:
 
 
 @router.put("/notifications/groups/{group}", responses=problems(404, 412))
-@guarded(get_receiver_group, queries.hold_group)
+@guarded(get_receiver_group, held(queries.group, "group"))
 def change_receiver_group(session: SessionDep, caller: Admin, group: GroupId, given: GroupIn) -> GroupOut:
     """Replace a group and its rota."""
     return GroupOut.of(group_actions.change_group(session, group, given, caller))
@@ -206,7 +206,7 @@ def get_delivery(session: SessionDep, delivery: DeliveryId) -> DeliveryOut:
 @tagged
 def get_own_address(session: SessionDep, caller: Viewer) -> ReceiverOut:
     """Your own mail address for notifications; 404 if you have given none."""
-    row = queries.own(session, caller.person_id) if caller.person_id is not None else None
+    row = queries.own(session, caller.person_id)
     if row is None:
         raise NotFound(_("You have given no mail address."), _("PUT /api/v1/notifications/me says one."))
     return ReceiverOut.of(row)

@@ -17,7 +17,7 @@ from app.settings import Settings
 
 def own_browser(session: Session, caller: Caller) -> Receiver:
     """The caller's browsers. Raises `NotFound` where they show no notifications."""
-    row = queries.own(session, caller.person_id, "browser") if caller.person_id is not None else None
+    row = queries.own(session, caller.person_id, "browser")
     if row is None:
         raise NotFound(
             _("Your browsers show no notifications."),
@@ -54,7 +54,7 @@ def delete_browser(session: Session, caller: Caller) -> None:
 
 def take(session: Session, given: PageIn, caller: Caller) -> list[Delivery]:
     """Messages of the last minute; what an open page has shown is delivered. A pause after failures ends: now a page is open."""
-    row = queries.own(session, caller.person_id, "browser") if caller.person_id is not None else None
+    row = queries.own(session, caller.person_id, "browser")
     if row is None:
         return []
     for number in sorted(set(given.shown)):

@@ -2,9 +2,9 @@
 
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from datetime import timedelta
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, NoReturn, TypeVar
 
-from sqlalchemy import func, or_, select
+from sqlalchemy import ColumnElement, func, or_, select
 from sqlalchemy.orm import Session
 
 from app.access.queries import hold_person
@@ -12,49 +12,57 @@ from app.errors import NotFound
 from app.language.i18n import _
 from app.loop.notifications.tables import Delivery, NotificationRoute, Receiver, ReceiverGroup
 
+Row = TypeVar("Row", NotificationRoute, Receiver, ReceiverGroup)
+
 
 def routes(session: Session, after: int = 0, limit: int = 1000) -> Sequence[NotificationRoute]:
     """Routes, in the order in which they were added."""
-    query = select(NotificationRoute).where(NotificationRoute.id > after).order_by(NotificationRoute.id).limit(limit)
-    return session.scalars(query).all()
-
-
-def route(session: Session, number: int, *, hold: bool = False) -> NotificationRoute:
-    """One route. hold: until the transaction ends. Raises `NotFound`."""
-    found = session.get(NotificationRoute, number, with_for_update=hold or None, populate_existing=True)
-    if found is None:
-        raise NotFound(_("There is no route {number}.").format(number=number), _("Choose one of the list."))
-    return found
-
-
-def hold_route(session: Session, given: Mapping[str, Any]) -> None:
-    """Hold the route that is named until the transaction ends."""
-    route(session, given["route"], hold=True)
+    return _rows(session, NotificationRoute, after, limit)
 
 
 def receivers(session: Session, after: int = 0, limit: int = 1000) -> Sequence[Receiver]:
     """Receivers, in the order in which they were added."""
-    query = (
-        select(Receiver).where(Receiver.deleted_at.is_(None), Receiver.id > after).order_by(Receiver.id).limit(limit)
-    )
-    return session.scalars(query).all()
+    return _rows(session, Receiver, after, limit, Receiver.deleted_at.is_(None))
 
 
-def hold_receiver(session: Session, given: Mapping[str, Any]) -> None:
-    """Hold the receiver that a route names until the transaction ends."""
-    receiver(session, given["receiver"], hold=True)
+def groups(session: Session, after: int = 0, limit: int = 1000) -> Sequence[ReceiverGroup]:
+    """Groups of receivers, in the order in which they were added."""
+    return _rows(session, ReceiverGroup, after, limit)
+
+
+def _rows(session: Session, table: type[Row], after: int, limit: int, *only: ColumnElement[bool]) -> Sequence[Row]:
+    return session.scalars(select(table).where(*only, table.id > after).order_by(table.id).limit(limit)).all()
+
+
+def route(session: Session, number: int, *, hold: bool = False) -> NotificationRoute:
+    """One route. hold: until the transaction ends. Raises `NotFound`."""
+    found = _row(session, NotificationRoute, number, hold)
+    return found or _missing(_("There is no route {number}."), number)
 
 
 def receiver(session: Session, number: int, *, hold: bool = False) -> Receiver:
     """One receiver that is not deleted. hold: until the transaction ends. Raises `NotFound`."""
-    found = session.get(Receiver, number, with_for_update=hold or None, populate_existing=True)
-    if found is None or found.deleted_at is not None:
-        raise NotFound(_("There is no receiver {number}.").format(number=number), _("Choose one of the list."))
-    return found
+    found = _row(session, Receiver, number, hold)
+    return found if found and found.deleted_at is None else _missing(_("There is no receiver {number}."), number)
+
+
+def group(session: Session, number: int, *, hold: bool = False) -> ReceiverGroup:
+    """One group. hold: until the transaction ends. Raises `NotFound`."""
+    return _row(session, ReceiverGroup, number, hold) or _missing(_("There is no group {number}."), number)
+
+
+def _row(session: Session, table: type[Row], number: int, hold: bool) -> Row | None:
+    return session.get(table, number, with_for_update=hold or None, populate_existing=True)
+
+
+def _missing(words: str, number: int) -> NoReturn:
+    raise NotFound(words.format(number=number), _("Choose one of the list."))
 
 
 def own(session: Session, person_id: int | None, means: str = "mail") -> Receiver | None:
-    """The mail address that a person has given, or their browsers; None without."""
+    """The mail address that a person has given, or their browsers; None without, and for a key, which is no person."""
+    if person_id is None:
+        return None
     query = select(Receiver).where(
         Receiver.person_id == person_id, Receiver.means == means, Receiver.deleted_at.is_(None)
     )
@@ -79,27 +87,8 @@ def receivers_of(rule: Mapping[str, Any]) -> set[int]:
 def check_receivers(session: Session, numbers: Iterable[int]) -> None:
     """Refuse numbers that no receiver has. Raises `NotFound`."""
     there = {row.id for row in receivers(session)}
-    for number in sorted(set(numbers) - there):
-        raise NotFound(_("There is no receiver {number}.").format(number=number), _("Choose one of the list."))
-
-
-def groups(session: Session, after: int = 0, limit: int = 1000) -> Sequence[ReceiverGroup]:
-    """Groups of receivers, in the order in which they were added."""
-    query = select(ReceiverGroup).where(ReceiverGroup.id > after).order_by(ReceiverGroup.id).limit(limit)
-    return session.scalars(query).all()
-
-
-def group(session: Session, number: int, *, hold: bool = False) -> ReceiverGroup:
-    """One group. hold: until the transaction ends. Raises `NotFound`."""
-    found = session.get(ReceiverGroup, number, with_for_update=hold or None, populate_existing=True)
-    if found is None:
-        raise NotFound(_("There is no group {number}.").format(number=number), _("Choose one of the list."))
-    return found
-
-
-def hold_group(session: Session, given: Mapping[str, Any]) -> None:
-    """Hold the group that is named until the transaction ends."""
-    group(session, given["group"], hold=True)
+    if missing := set(numbers) - there:
+        _missing(_("There is no receiver {number}."), min(missing))
 
 
 def groups_of(rule: Mapping[str, Any]) -> set[int]:

@@ -22,7 +22,7 @@ from app.loop.reactions.schemas import (
 from app.web.api import After, Limit, MachineFilter, SerialBefore, api_router, problems
 from app.web.choice import InPeriod
 from app.web.deps import FROM_REPLICA, SessionDep
-from app.web.etags import TAGGED, guarded, tagged
+from app.web.etags import TAGGED, guarded, held, tagged
 from app.web.fields import LARGEST_ID, Page, ReasonIn, Slug, Text200, page_of
 from app.web.limits import takes
 from app.web.pictures import AS_JSON, FILE, DigestPath, PictureIn, decoded, picture_of, served
@@ -138,7 +138,7 @@ def get_catalogue_entry(session: SessionDep, entry: EntryNumber) -> CatalogueEnt
 
 
 @router.patch("/reactions/catalogue/{entry}", responses=problems(404, 412))
-@guarded(get_catalogue_entry, queries.hold_entry)
+@guarded(get_catalogue_entry, held(queries.entry, "entry"))
 def change_catalogue_entry(
     session: SessionDep, caller: Engineer, entry: EntryNumber, change: CatalogueEntryChange
 ) -> CatalogueEntryOut:

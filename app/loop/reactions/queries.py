@@ -84,11 +84,6 @@ class Pareto(NamedTuple):
     names: dict[int, str]
 
 
-def hold_entry(session: Session, given: Mapping[str, Any]) -> None:
-    """Hold the entry of the catalogue that a route names until the transaction ends."""
-    entry(session, given["entry"], hold=True)
-
-
 def causes_of_alarms(
     session: Session,
     *,

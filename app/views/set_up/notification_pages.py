@@ -338,8 +338,7 @@ def _own(
     of_browser: Mapping[str, str] | None = None,
 ) -> Response:
     """of_browser: the form of the browsers, which came back with an error."""
-    person = caller.person_id
-    row, browser = (queries.own(session, person, each) if person is not None else None for each in ("mail", "browser"))
+    row, browser = (queries.own(session, caller.person_id, each) for each in ("mail", "browser"))
     errors = by_field(error) if error else {}
     if form is None:
         form = _quiet(row.quiet if row else ()) | {
