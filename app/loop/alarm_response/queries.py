@@ -20,6 +20,8 @@ from app.web.fields import LARGEST_ID
 from app.web.states import URGENCY
 
 AlarmState = Literal["active", "acknowledged", "all"]
+ITS_CHARACTERISTIC = (Characteristic.machine_id == Alarm.machine_id) & (Characteristic.id == Alarm.characteristic_id)
+"""Joins an alarm to its characteristic; it may have none."""
 
 
 class AlarmRow(NamedTuple):
@@ -37,10 +39,7 @@ def _rows() -> Select[Alarm, Machine, Characteristic, Correction, int | None]:
     return (
         select(Alarm, Machine, Characteristic, held, Tool.sister)
         .join(Machine, Machine.id == Alarm.machine_id)
-        .outerjoin(
-            Characteristic,
-            (Characteristic.machine_id == Alarm.machine_id) & (Characteristic.id == Alarm.characteristic_id),
-        )
+        .outerjoin(Characteristic, ITS_CHARACTERISTIC)
         .outerjoin(  # a tool has one held correction at most: a newer one supersedes it; its reading names its alarms
             held,
             (held.machine_id == Alarm.machine_id)

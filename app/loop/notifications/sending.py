@@ -22,7 +22,7 @@ from app.db.events import publish
 from app.db.tables import Event
 from app.language.i18n import _
 from app.language.times import end_of_shift, plant_zone
-from app.loop.alarm_response.queries import AlarmRow, alarm
+from app.loop.alarm_response.queries import ITS_CHARACTERISTIC, AlarmRow, alarm
 from app.loop.alarm_response.reaction_queries import Reactions, plans_in_force, trouble_of
 from app.loop.alarms.kinds import kind_named
 from app.loop.maintenance.queries import withheld_since
@@ -257,10 +257,7 @@ def _of_plans(session: Session) -> list[Route]:
     receivers: dict[int, tuple[int, ...]] = {}
     rows = session.execute(
         select(Alarm.id, Alarm.kind, Alarm.data, Characteristic.key)
-        .outerjoin(
-            Characteristic,
-            (Characteristic.machine_id == Alarm.machine_id) & (Characteristic.id == Alarm.characteristic_id),
-        )
+        .outerjoin(Characteristic, ITS_CHARACTERISTIC)
         .where(Alarm.acknowledged_at.is_(None))
         .order_by(Alarm.id.desc())
         .limit(MOST_ALARMS)
@@ -295,10 +292,7 @@ def _active(session: Session) -> list[Raised]:
     rows = session.execute(
         select(Alarm.id, Alarm.kind, Machine.key, Characteristic.key, Alarm.tool_memory, Alarm.raised_at)
         .join(Machine, Machine.id == Alarm.machine_id)
-        .outerjoin(
-            Characteristic,
-            (Characteristic.machine_id == Alarm.machine_id) & (Characteristic.id == Alarm.characteristic_id),
-        )
+        .outerjoin(Characteristic, ITS_CHARACTERISTIC)
         .where(Alarm.acknowledged_at.is_(None))
         .order_by(Alarm.id.desc())
         .limit(MOST_ALARMS)
@@ -324,10 +318,7 @@ def _record(session: Session, active: Iterable[Raised], same: Mapping[int, set[i
         )
         .join(Alarm, Alarm.id == Announced.alarm_id)
         .join(Machine, Machine.id == Alarm.machine_id)
-        .outerjoin(
-            Characteristic,
-            (Characteristic.machine_id == Alarm.machine_id) & (Characteristic.id == Alarm.characteristic_id),
-        )
+        .outerjoin(Characteristic, ITS_CHARACTERISTIC)
         .where(or_(Announced.at > now - CHATTER, Alarm.acknowledged_at.is_(None)))
         .order_by(Announced.at)
     ).all()

@@ -19,7 +19,7 @@ from app.errors import Invalid
 from app.language.i18n import _
 from app.language.times import begin_of_shift, end_of_shift
 from app.loop.alarm_response import queries as responses
-from app.loop.alarm_response.queries import AlarmRow
+from app.loop.alarm_response.queries import ITS_CHARACTERISTIC, AlarmRow
 from app.loop.alarms import ended_queries as endings
 from app.loop.machines.queries import machine_named, machines
 from app.loop.tables.alarms import Alarm
@@ -274,10 +274,7 @@ def _alarms(session: Session, period: Period, machine: Machine | None) -> list[R
     query = (
         select(Alarm, Machine, Characteristic)
         .join(Machine, Machine.id == Alarm.machine_id)
-        .outerjoin(
-            Characteristic,
-            (Characteristic.machine_id == Alarm.machine_id) & (Characteristic.id == Alarm.characteristic_id),
-        )
+        .outerjoin(Characteristic, ITS_CHARACTERISTIC)
         .where(Alarm.raised_at >= period.start, Alarm.raised_at < period.end)
         .order_by(Alarm.raised_at.desc(), Alarm.id.desc())
         .limit(MOST_ALARMS)
