@@ -114,6 +114,20 @@ def whole_numbers(text: str | None) -> list[int | str | None]:
     return [whole(number) for number in (text or "").replace(",", " ").replace(";", " ").split()]
 
 
+def ticked(form: Mapping[str, str], name: str) -> list[str]:
+    """The choices of a group of ticks, whose fields are `name-choice`.
+
+    >>> ticked({"day-1": "true", "day-2": "", "on": "true", "day-7": "true"}, "day")
+    ['1', '7']
+    """
+    return [field.removeprefix(f"{name}-") for field, value in form.items() if field.startswith(f"{name}-") and value]
+
+
+def ticked_numbers(form: Mapping[str, str], name: str) -> list[int]:
+    """The same where each choice is a number."""
+    return [int(each) for each in ticked(form, name) if each.isdecimal()]
+
+
 def lengths(text: str | None) -> list[float | str | None]:
     """Lengths in mm between blanks, semicolons or line ends, with a decimal point or comma.
 

@@ -16,7 +16,7 @@ from app.loop.notifications.calendar_schemas import CalendarIn
 from app.loop.notifications.group_schemas import EVERY_DAY, GroupIn, GroupOut
 from app.views.set_up.frame import setup_page
 from app.web.deps import FormDep, SessionDep
-from app.web.forms import by_field, parsed
+from app.web.forms import by_field, parsed, ticked_numbers
 
 router = APIRouter(include_in_schema=False)
 MOST_TURNS = 6
@@ -92,21 +92,15 @@ def _group(
     )
 
 
-def _chosen(form: Mapping[str, str], name: str) -> list[int]:
-    """The numbers that are ticked of a group of ticks, `name-number`."""
-    ends = [field.removeprefix(f"{name}-") for field, value in form.items() if field.startswith(f"{name}-") and value]
-    return [int(each) for each in ends if each.isdecimal()]
-
-
 def _read(form: Mapping[str, str]) -> dict[str, Any]:
     turns = []
     for at in range(1, MOST_TURNS + 1):
-        whom = _chosen(form, f"turn-{at}")
+        whom = ticked_numbers(form, f"turn-{at}")
         if whom:
             names = ("shift", "begins", "ends", "first", "last")
             turn = {name: form.get(f"{name}-{at}", "").strip() or None for name in names}
-            turns.append({"receivers": whom, "days": _chosen(form, f"day-{at}") or EVERY_DAY} | turn)
-    return {"name": form.get("name"), "members": _chosen(form, "member"), "rota": turns}
+            turns.append({"receivers": whom, "days": ticked_numbers(form, f"day-{at}") or EVERY_DAY} | turn)
+    return {"name": form.get("name"), "members": ticked_numbers(form, "member"), "rota": turns}
 
 
 def _fields(group: GroupOut) -> dict[str, str]:

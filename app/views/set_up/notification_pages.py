@@ -1,6 +1,6 @@
 """Pages of notifications: receivers, routes and deliveries for administrators; one's own mail address and browsers."""
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from datetime import UTC, datetime
 from functools import partial
 from typing import Any
@@ -28,7 +28,7 @@ from app.loop.notifications.wording import (
 )
 from app.views.set_up.frame import setup_page
 from app.web.deps import Before, FormDep, SessionDep, SettingsDep, get_settings
-from app.web.forms import by_field, parsed, whole
+from app.web.forms import by_field, parsed, ticked, ticked_numbers, whole
 from app.web.paging import address, part_of
 from app.web.states import word_of
 from app.web.templates import page
@@ -224,10 +224,9 @@ def _read(form: Mapping[str, str]) -> dict[str, Any]:
     flags = {name: form.get(name) == "true" for name in ("enabled", "on_days_off", "urgent")}
     minutes = {name: whole(form.get(name)) or 0 for name in ("repeat", "digest", "hold_off")}
     steps = [
-        {"after": whole(form.get(f"after-{at}")) or 0}
-        | {name: numbers(each) for name, each in zip(STEP_PARTS.values(), chosen, strict=True)}
+        {"after": whole(form.get(f"after-{at}")) or 0} | chosen
         for at in range(1, MOST_STEPS + 1)
-        if any(chosen := [ticked(form, f"{part}-{at}") for part in STEP_PARTS])
+        if any((chosen := {name: ticked_numbers(form, f"{part}-{at}") for part, name in STEP_PARTS.items()}).values())
     ]
     return {
         "name": form.get("name"),
@@ -235,7 +234,7 @@ def _read(form: Mapping[str, str]) -> dict[str, Any]:
         "tones": ticked(form, "tone"),
         "machines": form.get("machines", "").replace(",", " ").split(),
         "characteristics": form.get("characteristics", "").replace(",", " ").split(),
-        "hours": _hours(form, "hours", [int(day) for day in ticked(form, "day") if day.isdecimal()] or EVERY_DAY),
+        "hours": _hours(form, "hours", ticked_numbers(form, "day") or EVERY_DAY),
         "steps": steps,
         **flags,
         **minutes,
@@ -261,16 +260,6 @@ def _fields(rule: Mapping[str, Any]) -> dict[str, str]:
         }
     names = {name: ", ".join(rule[name]) for name in ("machines", "characteristics")}
     return fields | names
-
-
-def ticked(form: Mapping[str, str], name: str) -> list[str]:
-    """The choices of a group of ticks, `name-choice`."""
-    return [field.removeprefix(f"{name}-") for field, value in form.items() if field.startswith(f"{name}-") and value]
-
-
-def numbers(ticked: Iterable[str]) -> list[int]:
-    """Numbers that were ticked."""
-    return [int(each) for each in ticked if each.isdecimal()]
 
 
 def _hours(form: Mapping[str, str], name: str, days: Any) -> list[dict[str, Any]]:
