@@ -25,7 +25,19 @@ from app.loop.tables.machines import Machine
 from app.settings import Settings
 
 MOST_ROUTES, MOST_RECEIVERS = 200, 500
-_CHANGED = {"kind": "notifications"}
+
+
+def note_change(
+    session: Session,
+    caller: Caller,
+    action: str,
+    subject: str,
+    before: dict[str, Any] | None,
+    after: dict[str, Any] | None,
+) -> None:
+    """Put a change into the record, and let open pages know."""
+    record(session, caller.name, action, subject, before, after)
+    publish(session, {"kind": "notifications"})
 
 
 def add_route(session: Session, given: RouteIn, caller: Caller) -> NotificationRoute:
@@ -36,8 +48,7 @@ def add_route(session: Session, given: RouteIn, caller: Caller) -> NotificationR
     row = NotificationRoute(name=given.name, enabled=given.enabled, rule=_rule(given), created_by=caller.name)
     session.add(row)
     session.flush()
-    record(session, caller.name, "route added", f"notification-route/{row.id}", None, given.model_dump(mode="json"))
-    publish(session, _CHANGED)
+    note_change(session, caller, "route added", f"notification-route/{row.id}", None, given.model_dump(mode="json"))
     return row
 
 
@@ -49,8 +60,7 @@ def change_route(session: Session, number: int, given: RouteIn, caller: Caller) 
     row.name, row.enabled, row.rule = given.name, given.enabled, _rule(given)
     after = given.model_dump(mode="json")
     if before != after:
-        record(session, caller.name, "route changed", f"notification-route/{number}", before, after)
-        publish(session, _CHANGED)
+        note_change(session, caller, "route changed", f"notification-route/{number}", before, after)
     return row
 
 
@@ -59,8 +69,7 @@ def delete_route(session: Session, number: int, caller: Caller) -> None:
     row = queries.route(session, number, hold=True)
     before = _route_facts(row)
     session.delete(row)
-    record(session, caller.name, "route deleted", f"notification-route/{number}", before, None)
-    publish(session, _CHANGED)
+    note_change(session, caller, "route deleted", f"notification-route/{number}", before, None)
 
 
 def _route_facts(row: NotificationRoute) -> dict[str, Any]:
@@ -112,8 +121,7 @@ def added(session: Session, caller: Caller, row: Receiver) -> Receiver:
     session.add(row)
     session.flush()
     session.refresh(row)
-    record(session, caller.name, "receiver added", f"receiver/{row.id}", None, _facts(row))
-    publish(session, _CHANGED)
+    note_change(session, caller, "receiver added", f"receiver/{row.id}", None, _facts(row))
     return row
 
 
@@ -156,8 +164,7 @@ def change_receiver(
     session.flush()
     after = _facts(row)
     if before != after or change.address is not None:
-        record(session, caller.name, "receiver changed", f"receiver/{number}", before, after)
-        publish(session, _CHANGED)
+        note_change(session, caller, "receiver changed", f"receiver/{number}", before, after)
     return row
 
 
@@ -183,8 +190,7 @@ def delete_receiver(session: Session, number: int, caller: Caller) -> None:
         )
     row.deleted_at = datetime.now(UTC)
     row.secret = None
-    record(session, caller.name, "receiver deleted", f"receiver/{number}", _facts(row), None)
-    publish(session, _CHANGED)
+    note_change(session, caller, "receiver deleted", f"receiver/{number}", _facts(row), None)
 
 
 def _permitted(means: str, address: str, settings: Settings) -> None:

@@ -4,11 +4,10 @@ from datetime import UTC, datetime
 
 from sqlalchemy.orm import Session
 
-from app.access.audit.actions import record
 from app.access.callers import Caller
-from app.db.events import publish
 from app.errors import Invalid
 from app.language.i18n import _
+from app.loop.notifications.actions import note_change
 from app.loop.notifications.calendar_queries import calendar, countries, hold_calendar
 from app.loop.notifications.calendar_schemas import CalendarIn
 
@@ -25,8 +24,7 @@ def set_calendar(session: Session, given: CalendarIn, caller: Caller) -> None:
     row.country, row.subdivision, row.days = given.country, given.subdivision, after["days"]
     row.changed_at, row.changed_by = datetime.now(UTC), caller.name
     session.add(row)
-    record(session, caller.name, "days off changed", "days-off", before, after)
-    publish(session, {"kind": "notifications"})
+    note_change(session, caller, "days off changed", "days-off", before, after)
 
 
 def _check(given: CalendarIn) -> None:

@@ -12,6 +12,7 @@ from sqlalchemy.orm import Session
 from app.loop.notifications.calendar_schemas import CalendarOut, ComingOut, DayOffOut
 from app.loop.notifications.tables import PlantCalendar
 from app.settings import Settings
+from app.web.fields import answer_from
 
 YEAR = timedelta(days=366)
 _HOLD = text("SELECT pg_advisory_xact_lock(7291, 'plant_calendar'::regclass::oid::int4)")
@@ -71,8 +72,7 @@ def days_off(session: Session, years: Iterable[int], named: Collection[date] = (
 
 def as_answer(session: Session) -> CalendarOut:
     """The days off as they are set."""
-    row = calendar(session)
-    return CalendarOut(country=row.country, subdivision=row.subdivision, days=row.days)
+    return answer_from(CalendarOut, calendar(session))
 
 
 def coming(session: Session, today: date, settings: Settings) -> ComingOut:

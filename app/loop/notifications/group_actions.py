@@ -2,18 +2,16 @@
 
 from sqlalchemy.orm import Session
 
-from app.access.audit.actions import record
 from app.access.callers import Caller
-from app.db.events import publish
 from app.errors import Conflict, Invalid
 from app.language.i18n import _
 from app.language.times import plant_shifts
 from app.loop.notifications import queries
+from app.loop.notifications.actions import note_change
 from app.loop.notifications.group_schemas import GroupIn
 from app.loop.notifications.tables import ReceiverGroup
 
 MOST_GROUPS = 100
-_CHANGED = {"kind": "notifications"}
 
 
 def add_group(session: Session, given: GroupIn, caller: Caller) -> ReceiverGroup:
@@ -25,8 +23,7 @@ def add_group(session: Session, given: GroupIn, caller: Caller) -> ReceiverGroup
     session.add(row)
     session.flush()
     session.refresh(row)
-    record(session, caller.name, "group added", f"receiver-group/{row.id}", None, given.model_dump(mode="json"))
-    publish(session, _CHANGED)
+    note_change(session, caller, "group added", f"receiver-group/{row.id}", None, given.model_dump(mode="json"))
     return row
 
 
@@ -37,8 +34,7 @@ def change_group(session: Session, number: int, given: GroupIn, caller: Caller) 
     before, after = _facts(row), given.model_dump(mode="json")
     row.name, row.members, row.rota = after["name"], after["members"], after["rota"]
     if before != after:
-        record(session, caller.name, "group changed", f"receiver-group/{number}", before, after)
-        publish(session, _CHANGED)
+        note_change(session, caller, "group changed", f"receiver-group/{number}", before, after)
     return row
 
 
@@ -53,8 +49,7 @@ def delete_group(session: Session, number: int, caller: Caller) -> None:
         )
     before = _facts(row)
     session.delete(row)
-    record(session, caller.name, "group deleted", f"receiver-group/{number}", before, None)
-    publish(session, _CHANGED)
+    note_change(session, caller, "group deleted", f"receiver-group/{number}", before, None)
 
 
 def _facts(row: ReceiverGroup) -> dict[str, object]:

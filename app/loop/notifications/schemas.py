@@ -3,7 +3,7 @@
 import re
 from collections.abc import Iterable
 from datetime import datetime, time, timedelta
-from typing import Annotated, Any, Literal, Self
+from typing import Annotated, Literal, Self
 
 from pydantic import AfterValidator, BaseModel, Field, model_validator
 from pydantic_core import PydanticCustomError
@@ -144,14 +144,7 @@ class RouteOut(RouteIn):
     @classmethod
     def of(cls, row: NotificationRoute) -> Self:
         """A route of the table."""
-        return cls(
-            id=row.id,
-            name=row.name,
-            enabled=row.enabled,
-            created_at=row.created_at,
-            created_by=row.created_by,
-            **row.rule,
-        )
+        return answer_from(cls, row, **row.rule)
 
 
 class ReceiverIn(Body):
@@ -270,9 +263,9 @@ class ReceiverOut(BaseModel):
     created_by: Annotated[str, Field(description="Who added it.")]
 
     @classmethod
-    def of(cls, row: Receiver, **more: Any) -> Self:
+    def of(cls, row: Receiver) -> Self:
         """A receiver of the table, without its secret."""
-        return answer_from(cls, row, address=shown_address(row), person=row.person_id, **more)
+        return answer_from(cls, row, address=shown_address(row), person=row.person_id)
 
 
 class NewReceiverOut(ReceiverOut):

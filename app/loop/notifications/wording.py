@@ -50,10 +50,13 @@ def tones() -> list[tuple[str, str]]:
     ]
 
 
+def _days() -> list[str]:
+    return [_("Mon"), _("Tue"), _("Wed"), _("Thu"), _("Fri"), _("Sat"), _("Sun")]
+
+
 def when(hours: Mapping[str, Any]) -> str:
     """A stored part of the week, such as Mon–Fri 06:00–14:00."""
-    names = [_("Mon"), _("Tue"), _("Wed"), _("Thu"), _("Fri"), _("Sat"), _("Sun")]
-    days = sorted(hours["days"])
+    names, days = _days(), sorted(hours["days"])
     text = ", ".join(names[day - 1] for day in days)
     if len(days) > 2 and days == list(range(days[0], days[-1] + 1)):
         text = f"{names[days[0] - 1]}–{names[days[-1] - 1]}"
@@ -90,9 +93,9 @@ def group_words(row: ReceiverGroup, names: Mapping[int, str], now: datetime) -> 
 
 
 def _unattended(duty: DutyOut) -> str:
-    days = [_("Mon"), _("Tue"), _("Wed"), _("Thu"), _("Fri"), _("Sat"), _("Sun")]
+    names = _days()
     times = [
-        "–".join(f"{days[at.weekday()]} {at:%H:%M}" for at in (each.begins, each.ends))
+        "–".join(f"{names[at.weekday()]} {at:%H:%M}" for at in (each.begins, each.ends))
         for each in duty.unattended[:MOST_TIMES]
     ]
     return ", ".join(times) + (" …" if len(duty.unattended) > MOST_TIMES else "")
