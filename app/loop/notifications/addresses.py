@@ -3,15 +3,14 @@
 import re
 import socket
 from collections.abc import Callable
-from concurrent.futures import Future
 from contextlib import suppress
-from contextvars import copy_context
 from ipaddress import IPv4Address, IPv6Address, IPv6Network, ip_address, ip_network
-from threading import BoundedSemaphore, Thread
+from threading import BoundedSemaphore
 from typing import NamedTuple
 from urllib.parse import urlsplit
 
 from app.language.i18n import _
+from app.loop.notifications.threads import begun
 from app.settings import Settings
 
 Address = IPv4Address | IPv6Address
@@ -70,25 +69,13 @@ def check(means: str, address: str, settings: Settings) -> None:
 
 def _within(seconds: float, work: Callable[[], Place]) -> Place:
     """The result of work in a thread of its own. Raises what it raises; `Unknown` where it takes longer, or too many hang."""
-    late = Unknown(_("the name service does not answer"))
-    slots = _LOOKING
-    if not slots.acquire(blocking=False):
-        raise late
-    answer: Future[Place] = Future()
-
-    def run() -> None:
-        try:
-            answer.set_result(work())
-        except Exception as error:  # noqa: BLE001 - raised where it is waited for
-            answer.set_exception(error)
-        finally:
-            slots.release()
-
-    Thread(target=copy_context().run, args=(run,), name="name service", daemon=True).start()
+    answer = begun(_LOOKING, "name service", work)
     try:
-        return answer.result(seconds)
+        if answer is not None:
+            return answer.result(seconds)
     except TimeoutError:
-        raise late from None
+        pass
+    raise Unknown(_("the name service does not answer"))
 
 
 def _parts(url: str) -> tuple[str, str, int]:

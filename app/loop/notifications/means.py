@@ -11,7 +11,6 @@ import time
 from base64 import b64encode
 from collections.abc import Callable
 from contextlib import suppress
-from contextvars import copy_context
 from dataclasses import dataclass, field
 from datetime import datetime
 from email.message import EmailMessage
@@ -26,6 +25,7 @@ import msgspec
 from app import __version__
 from app.language.i18n import _
 from app.loop.notifications.addresses import APPRISE, Place, Refused, place_of
+from app.loop.notifications.threads import begun
 from app.settings import Settings
 
 LIMIT = 15.0
@@ -106,27 +106,10 @@ _MAILS, _APPRISE, _NAMES = (threading.BoundedSemaphore(32) for _each in range(3)
 
 async def _in_thread(slots: threading.BoundedSemaphore, work: Callable[[], Result]) -> Result:
     """The result of work in a thread of its own. Nobody waits for one that hangs; while all hang, no more are begun."""
-    if not slots.acquire(blocking=False):
+    result = begun(slots, "notification", work)
+    if result is None:
         raise OSError(_("too many servers that do not answer are being waited for"))
-    loop = asyncio.get_running_loop()
-    result: asyncio.Future[Result] = loop.create_future()
-
-    def settle(set_it: Callable[[Any], None], value: Any) -> None:
-        if not result.done():  # the time was not up yet
-            set_it(value)
-
-    def run() -> None:
-        try:
-            ended: tuple[Callable[[Any], None], Any] = (result.set_result, work())
-        except Exception as error:  # noqa: BLE001 - raised where it is awaited
-            ended = (result.set_exception, error)
-        finally:
-            slots.release()
-        with suppress(RuntimeError):  # the loop has ended meanwhile
-            loop.call_soon_threadsafe(settle, *ended)
-
-    threading.Thread(target=copy_context().run, args=(run,), name="notification", daemon=True).start()
-    return await result
+    return await asyncio.wrap_future(result)
 
 
 # --- mail

@@ -10,10 +10,10 @@ from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
 from contextvars import copy_context
-from functools import partial
 from typing import TypeVar
 
 from sqlalchemy.exc import OperationalError
+from sqlalchemy.orm import Session
 
 from app.db.engine import Database
 from app.db.outage import Outage
@@ -70,7 +70,7 @@ class Notifier:
                 now = asyncio.get_running_loop().time()
                 if now - tidied >= TIDY:
                     tidied = now
-                    await self._in_thread(self._tidy)
+                    await self._transaction(sending.forget_old)
                 self._outage.is_over()
             except OperationalError as error:
                 self._outage.goes_on(error)
@@ -81,8 +81,9 @@ class Notifier:
 
     async def look(self) -> None:
         """Begin what is due; alarms do not wait for the words about a shift."""
-        for plan in (self._plan, self._plan_shifts):
-            self._begin(await self._in_thread(plan))
+        address = self._settings.address
+        self._begin(await self._transaction(lambda session: sending.plan(session, address, self._days_off)))
+        self._begin(await self._transaction(lambda session: sending.plan_shifts(session, address, self._shift_report)))
 
     def _begin(self, jobs: list[Job]) -> None:
         for job in jobs:
@@ -99,26 +100,15 @@ class Notifier:
         if not answer.delivered:
             log.warning("delivery %d to receiver %d failed: %s", job.delivery, job.receiver, answer.text)
         try:
-            await self._in_thread(partial(self._end, job, answer))
+            await self._transaction(lambda session: sending.end(session, job, answer))
         except OperationalError as error:  # it counts as lost and is sent again
             self._outage.goes_on(error)
 
-    async def _in_thread(self, work: Callable[[], Result]) -> Result:
-        """The result of a transaction, in this plant's time."""
-        return await asyncio.get_running_loop().run_in_executor(self._threads, copy_context().run, work)
+    async def _transaction(self, work: Callable[[Session], Result]) -> Result:
+        """The result of a transaction in a thread, in this plant's time."""
 
-    def _plan(self) -> list[Job]:
-        with self._database.begin() as session:
-            return sending.plan(session, self._settings.address, self._days_off)
+        def run() -> Result:
+            with self._database.begin() as session:
+                return work(session)
 
-    def _plan_shifts(self) -> list[Job]:
-        with self._database.begin() as session:
-            return sending.plan_shifts(session, self._settings.address, self._shift_report)
-
-    def _end(self, job: Job, answer: Answer) -> None:
-        with self._database.begin() as session:
-            sending.end(session, job, answer)
-
-    def _tidy(self) -> None:
-        with self._database.begin() as session:
-            sending.forget_old(session)
+        return await asyncio.get_running_loop().run_in_executor(self._threads, copy_context().run, run)
