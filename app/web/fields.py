@@ -118,6 +118,8 @@ CHOSEN = "one of some likely ones, and what is typed besides as `more`"
 """How a form asks for a field."""
 IN_UM = "typed in µm"
 """Mark of a length in mm that a form asks for in µm."""
+LATER = "the later of a time that the clock shows twice"
+"""Mark of a time at which something ends."""
 
 Reason = Annotated[
     str,

@@ -2,16 +2,19 @@
 
 import re
 from collections.abc import Callable, Iterable, Mapping
+from datetime import datetime
 from types import UnionType
 from typing import Annotated, Any, TypeVar, Union, get_args, get_origin
 
-from pydantic import BaseModel, ValidationError
+from pydantic import AwareDatetime, BaseModel, ValidationError
 from pydantic.fields import FieldInfo
 
 from app.core.number_text import number_or_none
 from app.errors import FieldError, InbandError, Invalid
+from app.files.formats import cell_values
 from app.language.i18n import _
-from app.web.fields import CHOSEN, IN_UM
+from app.language.times import plant_zone
+from app.web.fields import CHOSEN, IN_UM, LATER
 from app.web.validation import field_errors
 
 Schema = TypeVar("Schema", bound=BaseModel)
@@ -40,7 +43,7 @@ def read(schema: type[BaseModel], form: Mapping[str, str]) -> dict[str, Any]:
     """Values of a form for the fields of a schema, by name.
 
     A length with comma or minus as people type it, in µm where the field says so; numbers between blanks, a tick, a reason
-    chosen or in own words (`words`).
+    chosen or in own words (`words`), a time by the plant's clock. Raises `Invalid` for what is no time.
     """
     return {name: _read(form, name, _kinds(field)) for name, field in schema.model_fields.items()}
 
@@ -53,6 +56,8 @@ def _read(form: Mapping[str, str], name: str, kinds: set[Any]) -> Any:
         return text == "true" or None
     if list in kinds:
         return (lengths(text) if float in kinds else whole_numbers(text)) or None
+    if AwareDatetime in kinds:
+        return moment(form, name, end=LATER in kinds)
     if float in kinds:
         return micrometres(text) if IN_UM in kinds else length(text)
     return whole(text) if int in kinds else text
@@ -101,6 +106,19 @@ def micrometres(text: str | None) -> float | str | None:
     """A length as people type it in µm, in mm."""
     value = length(text)
     return round(value / 1000, 9) if isinstance(value, float) else value
+
+
+def moment(form: Mapping[str, str], name: str, *, end: bool = False) -> datetime | None:
+    """A moment as people type it in this field, by the plant's clock; None where it is left empty. Raises `Invalid`.
+
+    Of a time that the clock shows twice the first one, as an `end` the second.
+    """
+    text, zone = form.get(name, "").strip(), plant_zone()
+    try:
+        return cell_values.moment(text, zone, fold=1 if end else 0) if text else None
+    except cell_values.Unreadable as error:
+        skipped = _("does not exist in {zone}: the clocks go forward in that hour").format(zone=zone.key)
+        raise Invalid.at(name, skipped if str(error) == cell_values.never_was(zone) else str(error)) from None
 
 
 def whole(text: str | None) -> int | str | None:

@@ -14,11 +14,11 @@ from app.errors import Conflict, InbandError, Invalid, NotAllowed
 from app.language.i18n import _
 from app.loop.machines import queries as machines
 from app.loop.maintenance import actions, queries, verbs
-from app.loop.maintenance.form_reader import as_typed, end_as_typed
 from app.loop.maintenance.queries import MaintenanceRow
+from app.loop.maintenance.schemas import ExtendIn, MaintenanceIn
 from app.loop.maintenance.verbs import END, OfMaintenance
 from app.web.deps import Before, FormDep, Number, SessionDep, Word
-from app.web.forms import by_field
+from app.web.forms import by_field, typed
 from app.web.paging import address, part_of
 from app.web.templates import page
 from app.web.verb import Outcome, Verb, draw_question, said
@@ -90,8 +90,9 @@ def _form(
 @router.post("/maintenance/new")
 def enter(request: Request, session: SessionDep, caller: Operator, form: FormDep) -> Response:
     """Enter it; times are by the plant's clock."""
+    stopping = form.get("stopping_anyway") == "true"  # without the tick: no
     try:
-        row = actions.enter_maintenance(session, as_typed(form), caller)
+        row = actions.enter_maintenance(session, typed(MaintenanceIn, form, stopping_anyway=stopping), caller)
     except (Invalid, Conflict, NotAllowed) as error:
         return _form(request, session, caller, form, error)
     machine = row.machine.key if row.machine else None
@@ -129,7 +130,7 @@ def _extend_form(
 def extend(request: Request, session: SessionDep, caller: Operator, number: int, form: FormDep) -> Response:
     """Move its end; times are by the plant's clock."""
     try:
-        actions.extend(session, number, end_as_typed(form), caller)
+        actions.extend(session, number, typed(ExtendIn, form), caller)
     except (Invalid, Conflict, NotAllowed) as error:
         return _extend_form(request, queries.maintenance(session, number), form, error)
     return RedirectResponse(address("/maintenance", done="extended", n=number), 303)

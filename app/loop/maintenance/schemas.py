@@ -6,7 +6,7 @@ from typing import Annotated, Self
 from pydantic import BaseModel, Field
 
 from app.loop.maintenance.queries import MaintenanceRow, State
-from app.web.fields import Body, Moment, Reason, Slug, answer_from
+from app.web.fields import LATER, Body, Moment, Reason, Slug, answer_from
 
 StoppingAnyway = Annotated[bool, Field(description="Notifications of alarms that stop a machine are still sent.")]
 
@@ -16,7 +16,7 @@ class MaintenanceIn(Body):
 
     machine: Annotated[Slug | None, Field(description="Key of the machine; null: all machines.")] = None
     begins: Annotated[Moment | None, Field(description="Not in the past; null: now.")] = None
-    ends: Annotated[Moment | None, Field(description="When it is over; null: 8 h after it begins.")] = None
+    ends: Annotated[Moment | None, LATER, Field(description="When it is over; null: 8 h after it begins.")] = None
     reason: Reason
     stopping_anyway: StoppingAnyway = True
 
@@ -30,7 +30,7 @@ class EndIn(Body):
 class ExtendIn(Body):
     """A later end of maintenance; a reason may be named."""
 
-    ends: Annotated[Moment, Field(description="The new end, later than the present one.")]
+    ends: Annotated[Moment, LATER, Field(description="The new end, later than the present one.")]
     reason: Reason | None = None
 
 

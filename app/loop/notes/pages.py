@@ -15,10 +15,10 @@ from app.loop.characteristics.queries import characteristic_named
 from app.loop.machines import queries as machines
 from app.loop.machines.queries import machine_named
 from app.loop.notes import actions, queries
-from app.loop.notes.form_reader import write_as_typed
+from app.loop.notes.schemas import NoteIn
 from app.web.deps import Before, FormDep, Number, SessionDep, Sought, Word
 from app.web.fields import LARGEST_ID, Reason
-from app.web.forms import by_field
+from app.web.forms import by_field, typed
 from app.web.paging import address, part_of
 from app.web.templates import page
 from app.web.validation import checked
@@ -70,8 +70,8 @@ def new_note(
     sequence: OfReading = None,
 ) -> Response:
     """The form of a note at a machine, at a characteristic, or at one of its readings."""
-    typed = {"machine": machine, "characteristic": characteristic, "sequence": sequence, "key": token_hex(8)}
-    return _form(request, session, {name: str(value) for name, value in typed.items() if value is not None})
+    about = {"machine": machine, "characteristic": characteristic, "sequence": sequence, "key": token_hex(8)}
+    return _form(request, session, {name: str(value) for name, value in about.items() if value is not None})
 
 
 def _form(request: Request, session: Session, form: Mapping[str, str], error: InbandError | None = None) -> Response:
@@ -96,7 +96,7 @@ def _form(request: Request, session: Session, form: Mapping[str, str], error: In
 def write(request: Request, session: SessionDep, caller: Operator, form: FormDep) -> Response:
     """Write the note; then the page of what it is about."""
     try:
-        row = write_as_typed(session, form, caller)
+        row = actions.write_note(session, typed(NoteIn, form), caller).row
     except (Invalid, Conflict) as error:
         return _form(request, session, form, error)
     return RedirectResponse(f"{row.home}#notes", 303)

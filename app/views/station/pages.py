@@ -23,8 +23,9 @@ from app.loop.alarm_response.outcomes import outcomes
 from app.loop.alarm_response.queries import AlarmRow
 from app.loop.alarm_response.reaction_queries import Reactions
 from app.loop.machines.queries import machine_named
+from app.loop.notes import actions as note_actions
 from app.loop.notes import queries as notes
-from app.loop.notes.form_reader import write_as_typed
+from app.loop.notes.schemas import NoteIn
 from app.loop.notes.wording import beginning
 from app.loop.tools import verbs
 from app.loop.tools.verbs import CHANGE, OfCorrection, OfTool
@@ -39,7 +40,7 @@ from app.views.station.who import REFUSED, asked, who
 from app.views.station.wording import next_action
 from app.web.deps import SESSION_COOKIE, STATION_COOKIE, FormDep, Number, SessionDep, SettingsDep, Word, from_this_site
 from app.web.fields import LARGEST_ID
-from app.web.forms import by_field
+from app.web.forms import by_field, typed
 from app.web.limits import FEW, takes
 from app.web.live import Access, stream
 from app.web.paging import address
@@ -348,7 +349,7 @@ def write_note(request: Request, session: SessionDep, at: Station, machine: str,
     """Write a note at the machine; sent twice, it is one."""
     written = {"machine": machine, "text": form.get("text", ""), "key": form.get("key", "")}
     try:
-        row = write_as_typed(session, written, who(request, session, at, form))
+        row = note_actions.write_note(session, typed(NoteIn, written), who(request, session, at, form)).row
     except (*REFUSED, Conflict) as error:
         return _ask_note(request, session, at, machine, form, error)
     return RedirectResponse(address(f"/station/{machine}", note=row.note.id), 303)

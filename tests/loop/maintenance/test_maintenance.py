@@ -8,7 +8,8 @@ import pytest
 
 from app.errors import Invalid
 from app.language.times import in_zone
-from app.loop.maintenance.form_reader import as_typed
+from app.loop.maintenance.schemas import MaintenanceIn
+from app.web.forms import typed
 from tests.conftest import Server
 from tests.shop import Person, Shop
 
@@ -203,7 +204,7 @@ class TestClock:
 
     def typed(self, begins: str, ends: str) -> tuple[datetime | None, datetime | None]:
         with in_zone(ZoneInfo("Europe/Belgrade")):
-            read = as_typed({"reason": "Oil", "begins": begins, "ends": ends})
+            read = typed(MaintenanceIn, {"reason": "Oil", "begins": begins, "ends": ends})
         return read.begins, read.ends
 
     def test_a_time_that_the_clock_skips_is_refused(self) -> None:

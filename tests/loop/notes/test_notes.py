@@ -2,10 +2,15 @@
 
 from datetime import UTC, datetime, timedelta
 from typing import Any
+from zoneinfo import ZoneInfo
 
 import pytest
 from playwright.sync_api import Page, expect
 
+from app.errors import Invalid
+from app.language.times import in_zone
+from app.loop.notes.schemas import NoteIn
+from app.web.forms import typed
 from tests.conftest import Server
 from tests.pages.looks import live
 from tests.shop import Person, Shop
@@ -165,6 +170,12 @@ class TestPages:
         operator = Person(server, "operator")
         fields = {"machine": running.machine, "text": "Words that were typed", "at": "2199-01-01T08:00"}
         assert "Words that were typed" in operator.send("/notes/new", 422, **fields)
+
+    def test_a_time_that_the_clock_skips_is_refused_in_words_for_people(self) -> None:
+        form = {"machine": "lathe", "text": "Oil", "at": "2026-03-29T02:30"}
+        with in_zone(ZoneInfo("Europe/Belgrade")), pytest.raises(Invalid) as refused:
+            typed(NoteIn, form)
+        assert refused.value.errors[0].message.endswith("the clocks go forward in that hour")
 
     def test_withdrawn_on_its_page(self, running: Shop, server: Server) -> None:
         number, engineer = write(running)["id"], Person(server, "engineer")
