@@ -282,11 +282,8 @@ def send_own(request: Request, session: SessionDep, caller: Viewer, settings: Se
             if form.get("do") == "delete":
                 actions.delete_own(session, caller)
             else:
-                sent: dict[str, Any] = {
-                    "address": form.get("address", "").strip(),
-                    "quiet": _hours(form, "quiet", EVERY_DAY),
-                }
-                sent["shift_report"] = form.get("shift_report") == "true"
+                sent = _pauses(session, form, caller, "mail")
+                sent |= {"address": form.get("address", "").strip(), "shift_report": form.get("shift_report") == "true"}
                 actions.set_own(session, parsed(OwnAddressIn, sent), caller, settings)
     except InbandError as error:
         if caller.person_id is None:
@@ -306,7 +303,7 @@ def send_own_browser(
             elif form.get("do") == "test":
                 actions.ask_for_test(session, browser_actions.own_browser(session, caller).id, caller)
             else:
-                given = parsed(OwnBrowserIn, {"quiet": _hours(form, "quiet", EVERY_DAY)})
+                given = parsed(OwnBrowserIn, _pauses(session, form, caller, "browser"))
                 browser_actions.set_browser(session, caller, settings, given)
     except InbandError as error:
         if caller.person_id is None:
@@ -355,3 +352,12 @@ def _quiet(stored: Sequence[Any]) -> dict[str, str]:
     """The quiet hours of a form: the first of those stored."""
     quiet = stored[0] if stored else {}
     return {f"quiet-{name}": quiet.get(name, "") for name in ("begins", "ends")}
+
+
+def _pauses(session: Session, form: Mapping[str, str], caller: Caller, means: str) -> dict[str, Any]:
+    """Quiet hours and absence. What was entered by REST and is more than the form holds stays, unless the form changes it."""
+    row = queries.own(session, caller.person_id, means)
+    if row is None:
+        return {"quiet": _hours(form, "quiet", EVERY_DAY)}
+    same = all(form.get(name, "") == value for name, value in _quiet(row.quiet).items())
+    return {"quiet": row.quiet if same else _hours(form, "quiet", EVERY_DAY), "away_until": row.away_until}

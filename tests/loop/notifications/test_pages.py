@@ -154,3 +154,21 @@ def test_everybody_says_where_they_get_mail(shop: Shop, server: Server) -> None:
     viewer.send("/account/notifications", do="delete")
     assert receiver_named(shop, viewer.name) is None
     assert viewer.browser.get("/api/v1/notifications/me").status_code == 404
+
+
+@pytest.mark.parametrize(
+    ("page", "fields"), [("", {"address": "anna@example.com"}), ("/browser", dict[str, str]())], ids=["mail", "browser"]
+)
+def test_what_ones_own_form_does_not_hold_is_kept(server: Server, page: str, fields: dict[str, Any]) -> None:
+    """Who is on holiday, and quiet at the weekend, is not called on Sunday because they ticked the report of the shift."""
+    viewer, path = Person(server, "viewer"), f"/api/v1/notifications/me{page}"
+    quiet = [{"days": [6, 7], "begins": "00:00", "ends": "00:00"}, {"days": [1, 2], "begins": "20:00", "ends": "06:00"}]
+    given = fields | {"quiet": quiet, "away_until": "2099-01-01T00:00:00Z"}
+    set_up = viewer.browser.put(path, json=given, headers={"X-CSRF-Token": viewer.csrf()}).json()
+    shown: dict[str, Any] = {"quiet-begins": "00:00", "quiet-ends": "00:00"}
+    viewer.send(f"/account/notifications{page}", **fields | shown)
+    kept = viewer.browser.get(path).json()
+    assert (kept["quiet"], kept["away_until"]) == (set_up["quiet"], set_up["away_until"]) == (quiet, kept["away_until"])
+    viewer.send(f"/account/notifications{page}", **fields | shown | {"quiet-begins": "21:00", "quiet-ends": "05:00"})
+    changed = viewer.browser.get(path).json()
+    assert (len(changed["quiet"]), changed["away_until"]) == (1, set_up["away_until"])
