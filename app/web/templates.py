@@ -23,7 +23,7 @@ from app import HOUSE, __version__
 from app.db.replica import Replica
 from app.errors import InbandError
 from app.language import i18n, numbers, short, times
-from app.web import cards, period, states, theme
+from app.web import cards, states, theme, usual_periods
 from app.web.assets import Assets
 from app.web.doors import door_of, machine_of, search_words, way_to
 from app.web.help_ways import help_of
@@ -108,7 +108,7 @@ def environment() -> Environment:
         grouped=numbers.grouped,
         breaking=breaking,
         when=numbers.when,
-        as_field=period.field,
+        as_field=usual_periods.field,
         ago=numbers.ago,
         in_short=short.in_short,
     )
@@ -125,7 +125,7 @@ def environment() -> Environment:
         states=states,
         inband_version=__version__,
         plant_zone=times.plant_zone,
-        usual_periods=period.usual_periods,
+        usual_periods=usual_periods.usual_periods,
     )
     return env
 

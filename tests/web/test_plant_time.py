@@ -18,7 +18,7 @@ from app.language.times import in_zone
 from app.loop.readings import exporting
 from app.loop.readings import queries as readings
 from app.views.reports.jobs_schemas import ReportsIn
-from app.web.period import field, usual_periods
+from app.web.usual_periods import field, usual_periods
 from tests.conftest import RunServer, Server
 from tests.forked import inband
 from tests.shop import Person, Shop

@@ -32,8 +32,8 @@ from app.web.deps import Before, FormDep, SessionDep, Sought, Word
 from app.web.fields import LARGEST_ID
 from app.web.forms import by_field, parsed
 from app.web.paging import address, part_of
-from app.web.period import with_preset
 from app.web.templates import page
+from app.web.usual_periods import with_preset
 
 router = APIRouter(include_in_schema=False)
 ON_PAGE = 50

@@ -27,8 +27,8 @@ from app.views.reports.request import SectionName, context_of, typed
 from app.web.deps import Before, SessionDep, texts
 from app.web.forms import by_field
 from app.web.paging import address, part_of
-from app.web.period import with_preset
 from app.web.templates import page
+from app.web.usual_periods import with_preset
 
 router = APIRouter(include_in_schema=False)
 SHOWN = 30

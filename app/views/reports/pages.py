@@ -23,8 +23,8 @@ from app.views.reports.request import EVERYTHING, ReportRequest, SectionName, ty
 from app.web.choice import InContext, context_in_address, in_address
 from app.web.deps import FROM_REPLICA, SessionDep
 from app.web.forms import by_field
-from app.web.period import with_preset
 from app.web.templates import page
+from app.web.usual_periods import with_preset
 
 router = APIRouter(include_in_schema=False, dependencies=[FROM_REPLICA])
 RUNS = ("200", "1000", "5000", "all")

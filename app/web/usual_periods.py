@@ -1,4 +1,7 @@
-"""Periods that people often look at, and moments as a field of a form holds them; by the clock of the plant."""
+"""Periods that people often look at, and moments as a field of a form holds them; by the clock of the plant.
+
+`app.web.choice` reads the period of an address.
+"""
 
 from collections.abc import Mapping
 from datetime import UTC, datetime, timedelta
