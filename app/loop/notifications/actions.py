@@ -109,7 +109,7 @@ def add_receiver(session: Session, given: ReceiverIn, caller: Caller, settings: 
     _permitted(given.means, given.address, settings)
     if len(queries.receivers(session)) >= MOST_RECEIVERS:
         raise Conflict(_("There are {n} receivers already.").format(n=MOST_RECEIVERS), _("Delete one first."))
-    return added(session, caller, Receiver(**given.model_dump(mode="json") | {"away_until": given.away_until}))
+    return added(session, caller, Receiver(**given.model_dump()))
 
 
 def added(session: Session, caller: Caller, row: Receiver) -> Receiver:
@@ -228,21 +228,8 @@ def set_own(session: Session, given: OwnAddressIn, caller: Caller, settings: Set
         change = ReceiverChange(address=given.address, quiet=given.quiet, away_until=given.away_until)
         return change_receiver(session, row.id, change, caller, settings, before)
     _permitted("mail", given.address, settings)
-    given_quiet = [each.model_dump() for each in given.quiet]
-    return added(
-        session,
-        caller,
-        Receiver(
-            name=caller.name,
-            means="mail",
-            address=given.address,
-            person_id=caller.person_id,
-            quiet=given_quiet,
-            away_until=given.away_until,
-            shift_report=given.shift_report,
-            shift_reported=reported,
-        ),
-    )
+    mine: dict[str, Any] = {"name": caller.name, "means": "mail", "person_id": caller.person_id}
+    return added(session, caller, Receiver(**mine, shift_reported=reported, **given.model_dump()))
 
 
 def delete_own(session: Session, caller: Caller) -> None:

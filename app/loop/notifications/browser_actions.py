@@ -1,7 +1,5 @@
 """Notifications in a person's browsers: an open page fetches its messages, shows them, and says so."""
 
-from typing import Any
-
 from sqlalchemy.orm import Session
 
 from app.access.callers import Caller
@@ -39,12 +37,10 @@ def set_browser(session: Session, caller: Caller, settings: Settings, given: Own
     if row is not None:
         change = ReceiverChange(quiet=given.quiet, away_until=given.away_until)
         return actions.change_receiver(session, row.id, change, caller, settings)
-    fields: dict[str, Any] = given.model_dump(mode="json") | {"away_until": given.away_until}
-    name = _("{name} (browser)").format(name=caller.name)
-    address = f"person/{caller.person_id}"  # each one's own: receivers with one address are one
-    return actions.added(
-        session, caller, Receiver(name=name, means="browser", address=address, person_id=caller.person_id, **fields)
-    )
+    name, person = _("{name} (browser)").format(name=caller.name), caller.person_id
+    address = f"person/{person}"  # each one's own: receivers with one address are one
+    made = Receiver(name=name, means="browser", address=address, person_id=person, **given.model_dump())
+    return actions.added(session, caller, made)
 
 
 def delete_browser(session: Session, caller: Caller) -> None:

@@ -166,8 +166,12 @@ def _job(session: Session, row: Receiver, about: str, made: Message, **more: Any
     )
     session.add(delivery)
     session.flush()
+    return _begun(row, delivery, made, **more)
+
+
+def _begun(row: Receiver, delivery: Delivery, made: Message, **more: Any) -> Job:
     made.data["delivery"] = delivery.id
-    return Job(delivery.id, row.id, about, row.means, row.address, row.secret, made, **more)
+    return Job(delivery.id, row.id, delivery.about, row.means, row.address, row.secret, made, **more)
 
 
 def _tests(session: Session, rows: dict[int, Receiver], free: set[int], address: str) -> list[Job]:
@@ -180,9 +184,7 @@ def _tests(session: Session, rows: dict[int, Receiver], free: set[int], address:
         if row.id in jobs:
             continue
         delivery.state = "sending"
-        made = message.of_test(row.name, delivery.asked_by or "", address)
-        made.data["delivery"] = delivery.id
-        jobs[row.id] = Job(delivery.id, row.id, "test", row.means, row.address, row.secret, made)
+        jobs[row.id] = _begun(row, delivery, message.of_test(row.name, delivery.asked_by or "", address))
     return list(jobs.values())
 
 
