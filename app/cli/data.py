@@ -233,9 +233,8 @@ def import_file(
 
 def _one_or_several(said: bool) -> None:
     if not said:
-        raise typer.BadParameter(
-            _("Name one characteristic, or the columns of several."), param_hint="--characteristic"
-        )
+        words = _("Name one characteristic, the columns of several, or their names: --map characteristic=COLUMN.")
+        raise typer.BadParameter(words, param_hint="--characteristic")
 
 
 def _with_missing(

@@ -229,9 +229,9 @@ def _columns(
     """The columns, or names in the rows, that are chosen; those that are left out; and the machine for new ones."""
     said = given.characteristics.items()
     columns = wide.columns_named(said, layout) if said else wide.columns_known(database, layout)
-    with_new, _others, machine = wide.with_missing(database, columns, layout, given.machine)
+    machine = given.machine
     if given.create_missing:
-        columns = with_new
+        columns, _others, machine = wide.with_missing(database, columns, layout, machine)
     unknown = _("nothing here has its key or name; name it under characteristics")
     chosen = {column.place for column in columns}
     left_out = [

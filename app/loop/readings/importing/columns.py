@@ -44,6 +44,8 @@ def columns_of(header: tuple[str, ...], mapping: Mapping[str, str]) -> dict[str,
             if places is None:
                 message = _("There is no column {column}; the file has: {header}.")
                 message = message.format(column=repr(column), header=", ".join(header))
+                if len(header) == 1:
+                    message += " " + _("Columns that are aligned by blanks are parted by --delimiter blanks.")
                 problems.append(FieldError(f"map {name}", message))
             elif in_another_scale(header, name, places):
                 message = _("The column {column} names another scale; temperatures are in °C.").format(

@@ -38,8 +38,14 @@ def _content(place: int, name: str, drawn: Drawn, layout: Layout) -> Content:
         return Content(place, "", "", "", name, "mm", not_new=str(error))
     if lower is None and upper is not None and not nominal and natural in (None, NaturalLimit.LOWER):
         nominal, lower, natural = 0.0, 0.0, NaturalLimit.LOWER  # a form error
-    reason = not_new(nominal, lower, upper, (_("the lower limit"), _("the upper limit")))
+    reason = not_new(nominal, lower, upper, (_limit(layout, "lower"), _limit(layout, "upper")))
     return Content(place, "", "", "", name, "mm", nominal, lower, upper, not_new=reason, natural_limit=natural)
+
+
+def _limit(layout: Layout, side: str) -> str:
+    """The limit that is missing, and how its column is named where none is known."""
+    words = {"lower": _("the lower limit"), "upper": _("the upper limit")}[side]
+    return words if side in layout.columns else _("{limit} (--map {side}=COLUMN)").format(limit=words, side=side)
 
 
 def _natural(drawn: Drawn, layout: Layout) -> NaturalLimit | None:
@@ -56,8 +62,11 @@ def _natural(drawn: Drawn, layout: Layout) -> NaturalLimit | None:
 def _limits(name: str, drawn: Drawn, layout: Layout) -> tuple[float | None, float | None, float | None]:
     """Nominal size, lower and upper limit, mm. Raises `_Wrong`."""
     if drawn.other:
-        words = _("lines {first} and {other} give it different limits, nominal sizes or units")
-        raise _Wrong(words.format(first=drawn.line, other=drawn.other))
+        words = _(
+            "lines {first} and {other} give it different limits, nominal sizes or units: if another column tells them apart, "
+            "--map characteristic={column}+COLUMN"
+        )
+        raise _Wrong(words.format(first=drawn.line, other=drawn.other, column=layout.named("characteristic")))
     both = is_both_ways(layout.named("lower"))
     if drawn.lower and is_tolerance(layout.named("lower")):
         if not is_both_ways(drawn.lower):

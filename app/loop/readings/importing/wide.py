@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 from sqlalchemy.orm import Session
 
 from app.db.engine import Database
-from app.errors import InbandError, Invalid
+from app.errors import FieldError, InbandError, Invalid
 from app.files.formats import cell_values
 from app.language.i18n import _
 from app.loop.characteristics import queries as characteristics
@@ -200,6 +200,8 @@ def _refuse_flawed(results: Sequence[ColumnResult]) -> None:
     flawed = [trouble for trouble in troubles if isinstance(trouble, Flawed)]
     others = [trouble for trouble in troubles if not isinstance(trouble, Flawed)]
     if others:
+        named = ((each.column.characteristic, each.trouble) for each in results if each.trouble is not None)
+        others[0].detail = " ".join(f"{key}: {trouble.detail}" for key, trouble in named)
         raise others[0]
     if flawed:
         flaws: list[Flaw] = sorted(flaw for trouble in flawed for flaw in trouble.flaws)
@@ -237,8 +239,14 @@ def columns_known(database: Database, layout: Layout) -> list[Column]:
 def with_missing(
     database: Database, columns: Sequence[Column], layout: Layout, machine: str | None
 ) -> tuple[list[Column], list[Content], str | None]:
-    """The columns, with `NEW` for all others that the rows describe; those that they do not; and the machine for new ones."""
+    """The columns, with `NEW` for all others that the rows describe; those that they do not; and the machine for new ones.
+
+    Raises `Invalid` where nothing is left.
+    """
     new, left_out = drawn.missing(layout, {column.place for column in columns})
+    if left_out and not columns and not new:
+        reasons = [FieldError(each.title, each.not_new) for each in left_out[:20]]
+        raise Invalid(_("None of the characteristics of the table can be set up."), errors=reasons)
     with database.sessions() as session:
         return [*columns, *(Column(each.index, NEW) for each in new)], left_out, machine_for(session, new, machine)
 

@@ -644,7 +644,7 @@ def test_of_such_a_table_what_is_missing_is_set_up_with_its_limits(plant: Plant,
         ("Feature;Meas;Nominal [in];Upper Tol [µm];Lower Tol [µm]", "A;0.5;0.5;10;-10", (12.7, 12.69, 12.71)),
         ("Feature;Meas;Nominal;Upper Tol;Lower Tol", "A;16.001;16;0.010;0.005", "is above 0: a deviation"),
         ("Feature;Meas;Upper Tol;Lower Tol", "A;16.001;0.010;-0.005", "from a nominal size, which is missing"),
-        ("Feature;Meas;Nominal;Upper Tol", "A;16.001;16;0.010", "the lower limit is missing"),
+        ("Feature;Meas;Nominal;Upper Tol", "A;16.001;16;0.010", "the lower limit (--map lower=COLUMN) is missing"),
         (
             "Feature;Meas;Nominal;USL;LSL",
             "A;16;16;16.1;15.9\nA;16;16;16.2;15.9",
