@@ -229,9 +229,10 @@ def _columns(
     """The columns, or names in the rows, that are chosen; those that are left out; and the machine for new ones."""
     said = given.characteristics.items()
     columns = wide.columns_named(said, layout) if said else wide.columns_known(database, layout)
-    machine = given.machine
+    with_new, others, machine = wide.with_missing(database, columns, layout, given.machine)
     if given.create_missing:
-        columns, _others, machine = wide.with_missing(database, columns, layout, machine)
+        columns = with_new
+        wide.refuse_none(columns, others)
     unknown = _("nothing here has its key or name; name it under characteristics")
     chosen = {column.place for column in columns}
     left_out = [

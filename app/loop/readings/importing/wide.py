@@ -239,16 +239,17 @@ def columns_known(database: Database, layout: Layout) -> list[Column]:
 def with_missing(
     database: Database, columns: Sequence[Column], layout: Layout, machine: str | None
 ) -> tuple[list[Column], list[Content], str | None]:
-    """The columns, with `NEW` for all others that the rows describe; those that they do not; and the machine for new ones.
-
-    Raises `Invalid` where nothing is left.
-    """
+    """The columns, with `NEW` for all others that the rows describe; those that they do not; and the machine for new ones."""
     new, left_out = drawn.missing(layout, {column.place for column in columns})
-    if left_out and not columns and not new:
-        reasons = [FieldError(each.title, each.not_new) for each in left_out[:20]]
-        raise Invalid(_("None of the characteristics of the table can be set up."), errors=reasons)
     with database.sessions() as session:
         return [*columns, *(Column(each.index, NEW) for each in new)], left_out, machine_for(session, new, machine)
+
+
+def refuse_none(columns: Sequence[Column], left_out: Sequence[Content]) -> None:
+    """Refuse a table of which nothing can be set up. Raises `Invalid` with each reason."""
+    if left_out and not columns:
+        reasons = [FieldError(each.title, each.not_new) for each in left_out[:20]]
+        raise Invalid(_("None of the characteristics of the table can be set up."), errors=reasons)
 
 
 def columns_of(form: Mapping[str, str], layout: Layout) -> list[Column]:

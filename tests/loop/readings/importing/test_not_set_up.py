@@ -47,6 +47,13 @@ def test_where_nothing_can_be_set_up_each_reason_is_said(shop: Shop) -> None:
     assert [each["field"] for each in refused["errors"]] == [f"{shop.machine}-1", f"{shop.machine}-2"]
 
 
+def test_one_of_a_table_is_set_up_by_name(shop: Shop) -> None:
+    text = f"Feature,Nominal,Actual,+Tol,-Tol\n{shop.machine}-N,12,12.001,0.01,0.01\n{shop.machine}-M,1,1,,\n"
+    body: dict[str, Any] = {"name": "a.csv", "content": text, "machine": shop.machine}
+    done = shop.call("POST", "/readings/table", characteristics={f"{shop.machine}-N": "+"}, **body)
+    assert (done["stored"], done["characteristics"][0]["created"]) == (1, True)
+
+
 def test_what_cannot_be_stored_is_named_by_its_characteristic(shop: Shop) -> None:
     other = shop.another("near")
     text = f"Feature,Actual\n{other},40.001\n{shop.characteristic},17\n"
