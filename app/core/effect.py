@@ -49,6 +49,7 @@ PASSES = 4
 FEWEST_FOR_GAIN, FEWEST_PARTS = 4, 12
 STARTS = (1.0, 0.0, 0.5, 2.0, -1.0)
 CREDIBLE = 0.9999  # of confidence, two-sided, for a verdict on the gain
+CREDIBLY_STRONG = 0.99  # for that of twice: no loop whose gain is right looks like one (docs/reference/gain.md)
 HALVED, DOUBLED = 0.75, 1.5  # nearer to 1/2 or to 2 than to 1
 HALF = 0.5  # where this is not ruled out, no alarm says that the control does not use the offset
 
@@ -108,7 +109,7 @@ def measured_effect(deviation: Floats, compensated: Floats, factor: float, begin
 
 
 class GainVerdict(StrEnum):
-    """Verdict on the gain of corrections, credible to `CREDIBLE`."""
+    """Verdict on the gain of corrections, credible to `CREDIBLE`, that of strong to `CREDIBLY_STRONG`."""
 
     OPPOSITE = "opposite"
     NONE = "none"  # the control does not use this offset
@@ -165,7 +166,9 @@ def gain_of(deviation: Floats, compensated: Floats, factor: float) -> Gain | Non
     ):  # steps of the process that corrections answer look like chips, and gain 0
         return None
     value, half, sure = line.slope, _half(line, LEVEL), _half(line, CREDIBLE)
-    return Gain(value, value - half, value + half, corrections, len(y), _verdict(value - sure, value + sure))
+    strong = value - _half(line, CREDIBLY_STRONG) > DOUBLED
+    verdict = GainVerdict.STRONG if strong else _verdict(value - sure, value + sure)
+    return Gain(value, value - half, value + half, corrections, len(y), verdict)
 
 
 def _verdict(low: float, high: float) -> GainVerdict | None:
@@ -173,7 +176,7 @@ def _verdict(low: float, high: float) -> GainVerdict | None:
         return GainVerdict.OPPOSITE
     if high < HALVED:
         return GainVerdict.NONE if low <= 0 and high < HALF else GainVerdict.WEAK
-    return GainVerdict.STRONG if low > DOUBLED else None
+    return None
 
 
 def _estimated(y: Floats, x: Floats, begins: Flags, start: float, scatter: float) -> tuple["_Line", float]:

@@ -16,6 +16,7 @@ from app.loop.tools.jobs import JOBS
 from app.loop.tools.untaken import Watch
 from app.simulators.controls.model import UNMAPPED, Model, Steps
 from app.simulators.controls.mqtt import mosquitto
+from app.simulators.controls.opcua import Nc
 from bench.outcome import Play, Process
 from tests.bridge.test_outcome import START, applied, play
 from tests.conftest import TLS, Server
@@ -46,17 +47,23 @@ def amiss(factor: float, start: float, one: Play, _patch: pytest.MonkeyPatch) ->
 
 
 def nobody_takes(one: Play, patch: pytest.MonkeyPatch) -> None:
-    """The call is missing in the part program; where the bridge writes by itself, the control never rests with tool 3."""
+    """The call is missing in the part program; where the bridge writes by itself, the control says that it is at work with tool 3."""
 
     def never(_process: Process) -> Steps:
         yield
 
     def busy(process: Process) -> Steps:
         yield from Model.part(process)
-        process.running, process.tool_in_spindle = True, 3
+        process.running = True
 
+    def at_work(control: Nc) -> None:
+        shown(control)
+        control.running, control.tool = True, 3
+
+    shown = Nc.copy
     if one.corrections == "direct":
         patch.setattr(Process, "part", busy)
+        patch.setattr(Nc, "copy", at_work)
     else:
         patch.setattr(Process, "take_corrections", never)
 
