@@ -25,6 +25,8 @@ from app.web.verb import Outcome, Verb, draw_question, said
 
 router = APIRouter(include_in_schema=False)
 ON_PAGE = 50
+ALL = "*"
+"""In the form: all machines. No key of a machine is so."""
 
 
 @router.get("/maintenance")
@@ -81,18 +83,27 @@ def _form(
         form=form,
         errors=by_field(error) if error else {},
         problem=error if error and not error.errors else None,
-        choices=[("", _("All machines")), *known] if caller.may("engineer") else known,
+        choices=[("", _("choose …")), *known, *([(ALL, _("All machines"))] if caller.may("engineer") else [])],
         usual=actions.USUAL,
         longest=actions.OF_OPERATOR,
     )
 
 
+def as_typed(form: Mapping[str, str]) -> MaintenanceIn:
+    """Maintenance as typed. Raises `Invalid`, also where no machine is chosen: a default must not silence the whole plant."""
+    machine = form.get("machine", "").strip()
+    if not machine:
+        raise Invalid.at("machine", _("choose one, or all machines"))
+    named = {**form, "machine": "" if machine == ALL else machine}
+    stopping = form.get("stopping_anyway") == "true"  # without the tick: no
+    return typed(MaintenanceIn, named, stopping_anyway=stopping)
+
+
 @router.post("/maintenance/new")
 def enter(request: Request, session: SessionDep, caller: Operator, form: FormDep) -> Response:
     """Enter it; times are by the plant's clock."""
-    stopping = form.get("stopping_anyway") == "true"  # without the tick: no
     try:
-        row = actions.enter_maintenance(session, typed(MaintenanceIn, form, stopping_anyway=stopping), caller)
+        row = actions.enter_maintenance(session, as_typed(form), caller)
     except (Invalid, Conflict, NotAllowed) as error:
         return _form(request, session, caller, form, error)
     machine = row.machine.key if row.machine else None

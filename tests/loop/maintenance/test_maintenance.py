@@ -8,6 +8,7 @@ import pytest
 
 from app.errors import Invalid
 from app.language.times import in_zone
+from app.loop.maintenance.pages import as_typed
 from app.loop.maintenance.schemas import MaintenanceIn
 from app.web.forms import typed
 from tests.conftest import Server
@@ -253,6 +254,13 @@ class TestPages:
         person = Person(server, "operator")
         shown = person.send("/maintenance/new", 403, machine=shop.machine, reason="Oil", ends=ahead(30)[:16])
         assert "requires the Engineer role" in shown
+
+    def test_all_machines_are_chosen_and_no_default(self, shop: Shop, server: Server) -> None:
+        """Notifications of the whole plant must not stop because a field was left as it was."""
+        person = Person(server, "engineer")
+        assert "Choose one, or all machines" in person.send("/maintenance/new", 422, machine="", reason="Oil")
+        assert listed(shop) == []
+        assert as_typed({"machine": "*", "reason": "Power cut"}).machine is None
 
     def test_its_ticks_count(self, shop: Shop, server: Server) -> None:
         Person(server, "engineer").send("/maintenance/new", machine=shop.machine, reason="Oil")
