@@ -307,6 +307,9 @@ def test_from_a_name_to_the_first_correction_in_three_forms(engineer: Person, sh
     (key,) = re.findall(r'name="key" value="([0-9a-f]{16})"', sheet)
     said = engineer.send(f"/station/{machine}/sizes", **{"key": key, f"size:{machine}-d25": "24,9995"})
     assert "Mark applied" in said
+    begins = re.compile(r'name="size:[^>]* autofocus')
+    assert begins.search(sheet)
+    assert not begins.search(said), "what was stored is not scrolled away"
     correction = shop.call("GET", f"/machines/{machine}/corrections?status=pending")["items"][0]
     assert correction["amount"] == -0.006
 
