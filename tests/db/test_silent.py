@@ -71,13 +71,15 @@ def processes(server: EmbeddedServer) -> list[int]:
 @contextmanager
 def stopped(ours: EmbeddedServer, _way: Way) -> Iterator[None]:
     """SIGSTOP: the kernel goes on taking what is sent."""
+    assert ours.pid is not None
+    os.kill(ours.pid, signal.SIGSTOP)  # the first of all: it begins no other from here on
     sent = processes(ours)
     for process in sent:
         os.kill(process, signal.SIGSTOP)
     try:
         yield
     finally:
-        for process in sent:
+        for process in reversed(sent):  # that one last: until then one that has ended still has its number
             os.kill(process, signal.SIGCONT)
 
 
