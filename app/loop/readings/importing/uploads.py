@@ -1,4 +1,7 @@
-"""Files that came by browser, kept between the look at them and the import: readable by nobody else, gone after a day."""
+"""Files that came by browser, kept between the look at them and the import: readable by nobody else, gone after a day.
+
+The newest five of a person stay: a workbook of 4 kB may be 200 MB as text.
+"""
 
 import json
 import os
@@ -19,6 +22,7 @@ from app.language.i18n import _
 from app.settings import Settings
 
 LASTS = 24 * 3600.0  # s
+MOST = 5  # of one person
 _TOKEN = re.compile(r"[A-Za-z0-9_-]{22}")
 
 
@@ -52,9 +56,9 @@ def keep_pair(settings: Settings, owner: str, files: Sequence[tuple[str, BinaryI
     if len(files) > 1 and sorted(endings) != [".dfd", ".dfx"]:
         raise Invalid.at("file", _("Choose one file, or a .dfd and its .dfx."))
     files = sorted(files, key=lambda file: Path(file[0]).suffix.lower())
-    folder = _folder(settings)
+    folder = folder_of(settings)
     folder.mkdir(mode=0o700, parents=True, exist_ok=True)
-    _sweep(folder)
+    _sweep(folder, owner)
     token = secrets.token_urlsafe(16)
     try:
         return _keep(folder, token, owner, files)
@@ -86,18 +90,24 @@ def _new(path: Path) -> BinaryIO:
     return os.fdopen(os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600), "wb")
 
 
-def _sweep(folder: Path) -> None:
-    """Files of yesterday go, and what a killed server has left of one that it read."""
+def _sweep(folder: Path, owner: str) -> None:
+    """Make room for one more: files of yesterday go, this person's oldest, and what a killed server has left of one that it read."""
+    own = []
     for old in folder.iterdir():
-        with suppress(FileNotFoundError):  # another request was faster
-            if old.stat().st_mtime < time.time() - LASTS:
+        with suppress(FileNotFoundError, ValueError):  # another request was faster, or still writes it
+            at = old.stat().st_mtime
+            if at < time.time() - LASTS:
                 old.unlink()
+            elif old.suffix == ".about" and json.loads(old.read_text())["owner"] == owner:
+                own.append((at, old.stem))
+    for _at, token in sorted(own)[: 1 - MOST]:
+        _remove(folder, token)
     sweep()
 
 
 def find(settings: Settings, owner: str, token: str, sheet: str = "") -> Upload:
     """The file that this person has sent; of a workbook the named sheet, else the first. Raises `NotFound`."""
-    folder = _folder(settings)
+    folder = folder_of(settings)
     if _TOKEN.fullmatch(token):
         try:
             about = json.loads((folder / f"{token}.about").read_text())
@@ -110,7 +120,9 @@ def find(settings: Settings, owner: str, token: str, sheet: str = "") -> Upload:
             values = folder / f"{token}.values"
             return Upload(token, about["name"], path, tuple(sheets), sheet, values if values.exists() else None)
     raise NotFound(
-        _("This file is not here any more: it was imported, or you sent it more than a day ago."),
+        _(
+            "This file is not here any more: it was imported, you sent it more than a day ago, or you have sent five others since."
+        ),
         _("Send it again under Set-up, Import."),
     )
 
@@ -125,5 +137,6 @@ def _remove(folder: Path, token: str) -> None:
         path.unlink(missing_ok=True)
 
 
-def _folder(settings: Settings) -> Path:
+def folder_of(settings: Settings) -> Path:
+    """The folder in which they wait."""
     return settings.data_dir / "imports"
