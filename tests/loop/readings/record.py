@@ -93,7 +93,8 @@ BROKEN = (
     """SELECT t.*, c.total FROM tool t JOIN LATERAL (
            SELECT coalesce(sum(amount), 0) AS total FROM correction c
            WHERE c.machine_id = t.machine_id AND c.tool_memory = t.number AND c.status = 'applied'
-               AND (t.changed_at IS NULL OR c.applied_at > t.changed_at)) c ON true
+               -- by the machine's clock, which may be behind; what was issued since was applied since
+               AND (t.changed_at IS NULL OR greatest(c.applied_at, c.created_at) > t.changed_at)) c ON true
        WHERE abs(t.total - c.total) > 1e-9""",
     """SELECT t.*, e.* FROM tool t JOIN LATERAL (
            SELECT offset_after FROM tool_event e WHERE e.machine_id = t.machine_id AND e.number = t.number

@@ -89,7 +89,8 @@ def test_the_loop_holds_sizes_far_better_than_no_loop(server: Server, spec: plan
         assert len(found) >= parts - 5
         with_loop = fmean(abs(reading["deviation"]) for reading in found)
         ratio = fmean(open_loop[feature.key]) / with_loop
-        if feature.parameters.get("mode") == "measure_only":
+        nothing_to_do = fmean(open_loop[feature.key]) < feature.zero_range / 3
+        if feature.parameters.get("mode") == "measure_only" or nothing_to_do:
             assert ratio == pytest.approx(1.0, abs=0.02)
         else:
             # The macro of the unmanned line corrects every part in full (R33 = 0, k = 1), its own scatter too.
