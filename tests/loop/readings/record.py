@@ -176,7 +176,7 @@ def history(dsn: str, characteristic: str) -> list[dict[str, Any]]:
 def replay(parameters: Parameters, stored: Iterable[dict[str, Any]]) -> list[tuple[dict[str, Any], Decision]]:
     """Decide each reading again, one after the other, by `app.core` and the plainest bookkeeping there is.
 
-    For a characteristic that has its tool and its average to itself and is paused by nobody. A part is cut with the
+    For a characteristic that has its tool and its average to itself; whether it was paused is as stored. A part is cut with the
     corrections up to its `correction_in_effect`, or with none that is not confirmed.
     """
     average = 0.0
@@ -192,7 +192,7 @@ def replay(parameters: Parameters, stored: Iterable[dict[str, Any]]) -> list[tup
             outstanding = [number for number in issued if number > in_effect]
         decision = decide(
             parameters,
-            LoopState(average),
+            LoopState(average, paused=reading["paused_by"] is not None),
             deviation_of(reading["measured"], parameters.target),
             outstanding=outstanding_effect((issued[number] for number in outstanding), parameters.factor),
         )
