@@ -11,7 +11,7 @@ Result = TypeVar("Result")
 
 
 def begun(slots: BoundedSemaphore, name: str, work: Callable[[], Result]) -> Future[Result] | None:
-    """The work in a thread that nobody has to wait for; None while all slots are taken by work that hangs."""
+    """Begin the work in a thread of its own; None while all slots are taken by work that hangs."""
     if not slots.acquire(blocking=False):
         return None
     result = Future[Result]()

@@ -207,9 +207,7 @@ def _not_taken(alarm: Alarm) -> str:
     ).format(n=count, first=data.get("first"), tool=alarm.tool_memory, since=since)
     if not data.get("bridge") or data.get("carried", True):
         return text
-    return f"{text} " + _(
-        "Its bridge carries no corrections: somebody has to enter them at the control and confirm them."
-    )
+    return f"{text} " + _("Its bridge carries no corrections: enter them at the control and confirm them here.")
 
 
 CORRECTIONS_NOT_TAKEN = register(
