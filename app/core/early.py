@@ -7,10 +7,11 @@ the corrections that it counts as cut with have done to it, and u what those tha
     D_i = w_i + g x_i + h u_i,    w_i = level_i + drift i + scatter,    level_i+1 = level_i + random step
 
 u is that of corrections which act after 0, 1, … `LATEST` parts, from the part on that asked for them, less those counted already.
-h is 0 where the count is right and near g where it is not. As in `app.core.gain` one Kalman filter foretells D and each regressor
-alike, and least squares of what it misses give g, h and the drift; g is 1 to within 1 before, the drift 0 to within the scatter. The
-scatter is that of the residuals; while few parts have shown it, h is taken for less sure. The limits are those with which no
-simulated tool life is taken for one of these (tests/core/test_early.py). Lengths are mm.
+h is 0 where the count is right and near g where it is not; far above g where an edge breaks just when a correction acts. As in
+`app.core.gain` one Kalman filter foretells D and each regressor alike, and least squares of what it misses give g, h and the drift;
+g is 1 to within 1 before, the drift 0 to within the scatter. The scatter is that of the residuals; while few parts have shown it, h
+is taken for less sure. The limits are those with which no simulated tool life is taken for one of these (tests/core/test_early.py).
+Lengths are mm.
 """
 
 from math import sqrt
@@ -28,6 +29,7 @@ CHANGES = 3  # of u, by more than this many times the scatter that is expected
 CLEAR = 2.0
 NEARER = 0.5  # h is nearer to 1 than to 0,
 SURE, LOWEST = 5.5, 0.3  # and this many standard errors above that
+HIGHEST = 2.5  # above it something else has moved the size, as an edge that breaks
 LEVEL_STEP = 0.1  # variance of a step of the level over that of the scatter
 PRIOR, FEW = 3.0, 90.0  # parts that the expected scatter is worth; errors are 1 + FEW / parts squared times as large
 
@@ -95,6 +97,6 @@ def acts_early(
         if changes < CHANGES:
             continue
         share, error = share_of(deviation[first:], counted[first:], missing, expected)
-        if share > NEARER and share - SURE * error > LOWEST:
+        if NEARER < share < HIGHEST and share - SURE * error > LOWEST:
             return after, share, error
     return -1, 0.0, 0.0

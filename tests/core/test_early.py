@@ -20,7 +20,8 @@ ROOM = 256  # corrections that may be on the way
 def life(rules, of, late, tolerance, watched):  # type: ignore[no-untyped-def]  # noqa: ANN001, ANN201 - compiled
     """One tool life in closed loop: the part at which it was paused, or -1, and the parts out of tolerance up to then.
 
-    late: a correction is counted so many parts after it acts. watched: it is judged.
+    late: a correction is counted so many parts after it acts. watched: it is judged. At part `wrong_from` the edge breaks: the
+    size jumps by `wrong` standard deviations.
     """
     np.random.seed(of.seed)  # noqa: NPY002
     deviation, compensated, outstanding = np.zeros(LONGEST), np.zeros(LONGEST), np.zeros(LONGEST)
@@ -34,6 +35,8 @@ def life(rules, of, late, tolerance, watched):  # type: ignore[no-untyped-def]  
         if part == of.edited:
             by_hand = np.random.normal() * 10 * of.sigma  # noqa: NPY002
             pending, average, begin, acting, counting = 0.0, 0.0, count, last, last
+        if part == of.wrong_from:
+            level += of.wrong * of.sigma
         while acting < last and due_part[acting % ROOM] <= part:
             effect, acting = effect + of.gain * effect_of(due[acting % ROOM], rules.factor), acting + 1
         while counting < last and due_part[counting % ROOM] + late <= part:
@@ -64,9 +67,13 @@ def life(rules, of, late, tolerance, watched):  # type: ignore[no-untyped-def]  
     return -1, out
 
 
+@pytest.mark.parametrize("broken", [False, True])
 @runs(1_000, 40_000)
-def test_no_loop_whose_parts_are_counted_right_is_taken_for_one(runs: int) -> None:
-    """As in `test_gain`, with wear of up to 1.5 standard deviations a part, and up to five parts on the way."""
+def test_no_loop_whose_parts_are_counted_right_is_taken_for_one(runs: int, *, broken: bool) -> None:
+    """As in `test_gain`, with wear of up to 1.5 standard deviations a part, and up to five parts on the way.
+
+    broken: the edge breaks, as it may in the part that is cut with a correction first.
+    """
     chance = np.random.default_rng(7)
     for _life in range(runs):
         of = np.zeros(1, SETTINGS)[0]
@@ -80,6 +87,8 @@ def test_no_loop_whose_parts_are_counted_right_is_taken_for_one(runs: int) -> No
         of["expected"], of["delay"] = expected_scatter(zero, limit), chance.choice([1, 2, 3, 5])
         of["parts"], of["seed"] = 200, chance.integers(2**31)
         of["changed"], of["edited"] = chance.integers(20, 200, 2)
+        if broken:
+            of["wrong_from"], of["wrong"] = chance.integers(8, 200), chance.choice([-1, 1]) * 10 ** chance.uniform(1, 3)
         rules = rules_of(zero, limit, chance.choice([1, 2, 3, 5, 10]), chance.choice([-1, 1, 0.5, -0.5, 2]))
         assert life(rules, of, 0, 1.0, True)[0] == -1, of
 
