@@ -9,6 +9,8 @@ systems' libraries do that by themselves; there nothing is done here.
 import asyncio
 import ctypes
 import gc
+import os
+import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from functools import cache
@@ -21,6 +23,12 @@ NICE = 10
 BEHIND = f"import os; hasattr(os, 'nice') and os.nice({NICE})"
 """First words of the program of a process for long work: it gives way to its server, so that readings go first. To read the
 modules takes such a process longer than many a task."""
+
+
+def give_way() -> None:
+    """Let this thread, and those that it starts, compute after others. Linux only: elsewhere the whole process would give way."""
+    if sys.platform == "linux":
+        os.nice(NICE)
 
 
 @cache

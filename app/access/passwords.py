@@ -3,14 +3,15 @@
 import hashlib
 import re
 import secrets
-import threading
 import unicodedata
+from concurrent.futures import ThreadPoolExecutor
 from functools import cache
 
 from pwdlib import PasswordHash
 
 from app.errors import FieldError, Invalid
 from app.language.i18n import _
+from app.memory import give_way
 
 SHORTEST = 10
 LONGEST = 200
@@ -47,29 +48,34 @@ _LIKE_LETTERS = str.maketrans("0134578@$!|", "oieastbasii")
 
 _hashing = PasswordHash.recommended()
 _code_cost = 2**15  # n of scrypt: 32 MB and a tenth of a second for each code that is tried
-# Argon2 takes 64 MB for each: a crowd at the door must not exhaust the memory that readings need.
-_at_once = threading.BoundedSemaphore(2)
+# Argon2 takes 64 MB and four threads for each: a crowd at the door must exhaust neither the memory nor the processors that
+# readings need. The threads that it starts give way as the one that starts them does.
+_threads = ThreadPoolExecutor(2, "passwords", initializer=give_way)
 
 
 def hashed(password: str) -> str:
     """Stored form of a password."""
-    with _at_once:
-        return _hashing.hash(password)
+    return _threads.submit(_hashing.hash, password).result()
 
 
 def matches(password: str, password_hash: str | None) -> bool:
     """Tell if this is the password. None, for a person who does not exist, takes as long and is never right."""
-    with _at_once:
-        right = _hashing.verify(password, password_hash or _nobodys())
+    right = _threads.submit(lambda: _hashing.verify(password, password_hash or _nobodys())).result()
     return right and password_hash is not None
 
 
 def looked_up(code: str) -> bytes:
     """Stored form of a code by which its owner is found: the same for the same code, and slow to compute for all that are tried."""
-    with _at_once:
-        return hashlib.scrypt(
-            code.encode("utf-8", "surrogatepass"), salt=b"inband badge", n=_code_cost, r=8, p=1, maxmem=2**26, dklen=32
-        )
+    return _threads.submit(
+        hashlib.scrypt,
+        code.encode("utf-8", "surrogatepass"),
+        salt=b"inband badge",
+        n=_code_cost,
+        r=8,
+        p=1,
+        maxmem=2**26,
+        dklen=32,
+    ).result()
 
 
 @cache

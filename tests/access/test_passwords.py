@@ -16,6 +16,7 @@ from sqlalchemy import select
 from app import HOUSE
 from app.access import passwords
 from app.access.tables import Person
+from app.memory import NICE
 from app.settings import Settings
 from tests.conftest import RunServer
 from tests.shop import PASSWORD
@@ -86,6 +87,19 @@ def test_a_program_has_the_recommended_cost_in_the_environment_of_the_tests() ->
     assert int(cost) >= 2**15 * 8, "of a code, such as a badge"
     assert Cost.of(made) == Cost.of(PasswordHash.recommended().hash(PASSWORD))
     assert right == "True"
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="elsewhere a thread has the priority of its process")
+def test_readings_go_before_those_who_guess(monkeypatch: pytest.MonkeyPatch) -> None:
+    class Asked:
+        @staticmethod
+        def hash(_password: str) -> str:
+            return str(os.getpriority(os.PRIO_PROCESS, 0))
+
+    monkeypatch.setattr(passwords, "_hashing", Asked)
+    own = os.getpriority(os.PRIO_PROCESS, 0)
+    assert int(passwords.hashed(PASSWORD)) == min(own + NICE, 19)
+    assert os.getpriority(os.PRIO_PROCESS, 0) == own, "the caller goes on as before"
 
 
 def test_nothing_in_the_program_sets_another_cost() -> None:
