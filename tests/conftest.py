@@ -444,7 +444,7 @@ def free_port() -> int:
     raise AssertionError
 
 
-def wait_ready(url: str, process: Process, stderr: Path, seconds: float = 180) -> None:
+def wait_ready(url: str, process: Process, stderr: Path, seconds: float = 600) -> None:
     """Until ``/health/ready`` says 200."""
     deadline = time.monotonic() + seconds
     while time.monotonic() < deadline:
@@ -457,6 +457,7 @@ def wait_ready(url: str, process: Process, stderr: Path, seconds: float = 180) -
             pass
         time.sleep(0.05)
     process.send_signal(signal.SIGKILL)
+    process.wait()
     pytest.fail(f"the server was not ready after {seconds} s:\n{stderr.read_text()}")
 
 
