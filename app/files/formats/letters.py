@@ -16,7 +16,40 @@ LETTERS = {
     "cp1251": "аеионрстлвкмдпузбјљњжчцшћђАВДИКМНОПРСТ" + _SIGNS_OF_ALL,
     "iso-8859-5": "аеионрстлвкмдпузбјљњжчцшћђАВДИКМНОПРСТ",
 }
+_WESTERN = ("äöüß", "àâæçèéêëîïôùûüœ", "àáâãçéêíóôõú", "áéíñóúü", "àèéìòù", "æøåéö", "åäöé", "äöõüšž")
+_EASTERN = ("ąćęłńóśźż", "áčďéěíňóřšťúůýž", "áäčďéíĺľňóôŕšťúýž", "áéíóöőúüű", "ăâîşţ", "čćđšž")
+_CYRILLIC = (
+    "абвгдежзийклмнопрстуфхцчшщъыьэюяё", "абвгдђежзијклљмнњопрстћуфхцчџш", "абвгґдеєжзиіїйклмнопрстуфхцчшщьюя",
+)  # fmt: skip
+LANGUAGES = {
+    "cp1252": _WESTERN,
+    "cp1250": _EASTERN,
+    "iso-8859-2": _EASTERN,
+    "cp1251": _CYRILLIC,
+    "iso-8859-5": _CYRILLIC,
+    "cp1254": ("âçğıîöşûüi\N{COMBINING DOT ABOVE}",),
+    "cp1257": ("ąčęėįšųūž", "āčēģīķļņšūž"),
+    "cp1253": ("αβγδεζηθικλμνξοπρστυφχψωςάέήίϊΐόύϋΰώ",),
+}
+"""The letters beyond a to z of each language, in lower case, by the encodings that its files have."""
+_OF_ONE_SCRIPT = frozenset({"cp1251", "iso-8859-5", "cp1253"})
+_WORD = re.compile(r"[^\W\d_]+")
+_SIGN_WITHIN = re.compile(r"(?<=[^\W\d_])[°±²³×„‚¹¼½¾¿§…](?=[^\W\d_])|[\x80-\x9f\N{REPLACEMENT CHARACTER}]")
+# No word of theirs: õ and û at the end, ì, ò and ù within, œ before another letter than i or u; č and ć between consonants; ъ, ы
+# and ь at the beginning.
+_FOREIGN = {
+    "western": re.compile(r"[õû](?![^\W\d_])|[ìòù](?=[^\W\d_])|œ(?![iu])", re.IGNORECASE),
+    "eastern": re.compile(r"(?<=[bcdfghjklmnpqstvwxz])[čć](?=[bcdfghjklmnpqstvwxz])", re.IGNORECASE),
+    "cyrillic": re.compile(r"\b[ъыь]", re.IGNORECASE),
+}
+_FAMILY = {
+    **dict.fromkeys(("cp1251", "iso-8859-5"), "cyrillic"),
+    **dict.fromkeys(("cp1250", "iso-8859-2"), "eastern"),
+    "cp1252": "western",
+}
 MOST_LINES = 500
+LONGEST_OF_ONE = 2  # letters of a word that may have no Latin letter among them
+_SIGNS = re.compile("[" + re.escape(_SIGNS_OF_ALL) + "]")
 FEWEST = 2  # letters of two bytes
 CAPITALS = 32  # bytes among which the capitals of a script lie
 _BEYOND = re.compile(r"[^\x00-\x7f]")
@@ -45,8 +78,12 @@ def guessed(content: bytes) -> tuple[str, bool]:
     """The encoding whose letters fit best, and whether they are letters of Europe rather than of East Asia."""
     lines = b"\n".join([line for line in content.splitlines() if not line.isascii()][:MOST_LINES])
     texts = {name: lines.decode(name, "replace") for name in LETTERS}
-    best = max(LETTERS, key=lambda name: _fit(texts[name], LETTERS[name]))
-    usual = all(sign in LETTERS[best] for sign in _BEYOND.findall(texts[best]))
+    best = max(LETTERS, key=lambda name: (_is_of_a_language(texts[name], name), _fit(texts[name], LETTERS[name])))
+    if not _is_of_a_language(texts[best], best):
+        others = {name: lines.decode(name, "replace") for name in LANGUAGES if name not in LETTERS}
+        best = next((name for name, text in others.items() if _is_of_a_language(text, name)), best)
+        texts |= others
+    usual = all(sign in LETTERS.get(best, "") for sign in _BEYOND.findall(texts[best]))
     return best, usual or _known(texts[best]) > 0 or not any(_is_asian(lines, each) for each in TO_NAME.values())
 
 
@@ -54,6 +91,26 @@ def _fit(text: str, letters: str) -> int:
     """Letters that its languages have, less those that they do not have; a heading that is known tells most, two scripts in a word against it."""
     fitting = sum(1 if sign in letters else -1 for sign in _BEYOND.findall(text))
     return fitting + 3 * _known(text) - 2 * len(_TWO_SCRIPTS.findall(text))
+
+
+def _is_of_a_language(text: str, encoding: str) -> bool:
+    """Tell if a heading is known, or all letters are of one language and no word is one that it cannot have."""
+    if _known(text):
+        return True
+    words = [word for word in _WORD.findall(_SIGNS.sub(" ", text)) if not word.isascii()]
+    if not words or _SIGN_WITHIN.search(text):
+        return False
+    foreign = _FOREIGN.get(_FAMILY.get(encoding, ""))
+    if foreign is not None and any(foreign.search(word) for word in words):
+        return False
+    if encoding in _OF_ONE_SCRIPT:
+        regular = all(word in {word.lower(), word.upper(), word.title()} for word in words)
+        if not regular or any(letter.isascii() for word in words for letter in word) or len(max(words, key=len)) == 1:
+            return False
+    elif any(len(word) > LONGEST_OF_ONE and len(_BEYOND.findall(word)) == len(word) for word in words):
+        return False
+    letters = set(_BEYOND.findall(" ".join(words).lower()))
+    return any(letters <= set(alphabet) for alphabet in LANGUAGES[encoding])
 
 
 def _known(text: str) -> int:

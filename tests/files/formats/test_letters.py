@@ -54,6 +54,25 @@ def test_a_heading_that_is_known_tells_the_encoding(encoding: str) -> None:
     assert {each: text for each, text in found.items() if text != each} == {}
 
 
+@pytest.mark.parametrize(
+    ("encoding", "text"),
+    [
+        *(("cp1250", each) for each in ("Külső-ű", "Belső átmérő", "Wałek", "Średnica", "Szerokość", "Průměr", "Šířka", "faţă", "Točkić")),
+        *(("cp1252", each) for each in ("Modèle", "Længde", "Høyde", "Längd å", "Diâmetro furação", "Größe", "Ø40", "Año ñ", "Läbimõõt")),
+        *(("cp1251", each) for each in ("Вал", "Кольцо ось", "Объём", "Пречник жлеба", "Внутрішній")),
+        *(("cp1253", each) for each in ("Διάμετρος", "Ο άξονας", "οπή")),
+        *(("cp1254", each) for each in ("İç çap", "Dış-Ş1", "Gövde ağız")),
+        *(("cp1257", each) for each in ("Žiedas ė", "Ašis ė")),
+    ],
+)
+def test_a_name_of_one_language_keeps_its_letters(encoding: str, text: str) -> None:
+    """A wrong letter in a name is another name, and nobody sees it among thousands of rows."""
+    content = f"Time;D40;Part\n18.11.2025 06:05;40,001;{text}\n".encode(encoding)
+    name, european = guessed(content)
+    assert european
+    assert content.decode(name) == content.decode(encoding)
+
+
 @pytest.mark.parametrize("encoding", ASIA)
 def test_letters_of_east_asia_are_asked_about(tmp_path: Path, encoding: str) -> None:
     assert encoding in TO_NAME
