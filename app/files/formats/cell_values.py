@@ -31,7 +31,10 @@ _ONE_WAY = tuple(
             _CLOCK,
         ),
         (r"(?:[^\W\d_]{2,10}\.?,?\s+)?(?P<m>[^\W\d_]{3,9})\.?\s+(?P<d>\d{1,2}),?\s+(?P<y>\d{4})", _CLOCK),
-        (r"(?P<y>\d{4})(?P<m>\d{2})(?P<d>\d{2})", r"[T_](?P<h>\d{2})(?P<min>\d{2})(?P<s>\d{2})(?P<f>)(?P<half>)"),
+        (
+            r"(?P<y>(?:19|20)\d{2})(?P<m>\d{2})(?P<d>\d{2})",  # as milliseconds it would be after the year 2600
+            r"[T_ ]?(?P<h>\d{2})(?P<min>\d{2})(?P<s>\d{2})(?:[.,](?P<f>\d{1,6})\d*)?(?P<half>)",
+        ),
     )
 )
 """Dates that can be read in one way only: the year first, or the month by its name."""

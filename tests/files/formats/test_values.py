@@ -65,6 +65,8 @@ def test_every_finite_number_is_read_back_exactly(value: float) -> None:
         "21.11.2026 08:15:02",
         "21.11.2026. 08:15:02",
         "21. 11. 2026 8:15:02",
+        "20261121081502",
+        "20261121 081502",
     ],
 )
 def test_times_as_people_write_them(text: str) -> None:
