@@ -387,7 +387,10 @@ def cautions(study: Study) -> list[str]:
 
 
 def _not_normal(study: Study) -> str:
-    """Warn that no normal distribution carries the numbers, and name the method that does, if any."""
+    """Warn that no normal distribution carries the numbers, and name the method that does, if an index may be quoted by it."""
+    carried = isinstance(study.by_fit, Fitted) or not isinstance(study.by_percentile, Refused)
+    if study.quote == "none" and carried:
+        return _("The readings are not normally distributed: the expected ppm do not hold.")
     if isinstance(study.by_fit, Fitted):
         return fits.caution(study.by_fit)
     if not isinstance(study.by_percentile, Refused):

@@ -320,6 +320,7 @@ def test_the_overview_keeps_the_last_verdict_that_could_be_quoted(server: Server
     told = of(shop, "", key)
     assert (told["quote"], told["quoted"], told["why_none"]) == ("none", None, "a reading lies far from all others")
     assert told["cautions"][0] == "Do not report an index: a reading lies far from all others."
+    assert "take the percentile method" not in str(told["cautions"]), "no method carries what is not to be reported"
     found = verdict_for_overview(server, key)
     assert (found.of.readings, found.of.last, found.now) == (120, 120, "far_off")
     assert found.of.value is not None
