@@ -17,6 +17,9 @@ LOWER_LIMITS = (
     "donja granica", "spodnja meja", "нижний предел",
 )  # fmt: skip
 """Names of columns that hold a limit as a size; *upper* and *lower* by any other name are deviations from the nominal size."""
+UPPER_OF_EITHER = ("upper", "up", "oben", "ober", "obere", "gornja", "zgornja", "верх", "верхний")
+LOWER_OF_EITHER = ("lower", "low", "unten", "unter", "untere", "donja", "spodnja", "низ", "нижний")
+"""Names of columns of limits that do not say whether they are sizes or deviations: their numbers do, beside the nominal size."""
 
 SUMMARIES = frozenset({
     "nominal", "nominal value", "nominal size", "target", "soll", "sollwert", "sollmass", "nennmass", "nazivna mera",
@@ -104,11 +107,11 @@ NAMES: dict[str, tuple[str, ...]] = {
     ),
     "upper": (
         "uppertol", "upper tol", "up tol", "uptol", "upper limit tol", "ob tol", "obere tol", "upper tolerance", "upper deviation", "+tol", "plus tol", "oberes abmass", "obere toleranz",
-        "gornje odstupanje", "zgornje odstopanje", "верхнее отклонение", *UPPER_LIMITS,
+        "gornje odstupanje", "zgornje odstopanje", "верхнее отклонение", *UPPER_LIMITS, *UPPER_OF_EITHER,
     ),
     "lower": (
         "lowertol", "lower tol", "low tol", "lowtol", "lower limit tol", "un tol", "unt tol", "untere tol", "lower tolerance", "lower deviation", "unteres abmass", "untere toleranz",
-        "donje odstupanje", "spodnje odstopanje", "нижнее отклонение", *LOWER_LIMITS,
+        "donje odstupanje", "spodnje odstopanje", "нижнее отклонение", *LOWER_LIMITS, *LOWER_OF_EITHER,
     ),
     "natural_limit": (
         "natural limit", "naturliche grenze", "prirodna granica", "naravna meja", "природна граница", "естественная граница",

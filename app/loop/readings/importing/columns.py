@@ -19,6 +19,11 @@ DATES = frozenset(map(key_of, (
     "date", "datum", "дата", "датум", "data", "fecha", "dátum", "tarih", "日付", "日期", "날짜", "measured on", "messdatum",
 )))  # fmt: skip
 FEATURES = frozenset(map(key_of, ("feature", "feature name", "element", "element name", "geometrieelement")))
+NAMED = ("id", *map(key_of, (
+    "name", "dimension", "dimension name", "bezeichnung", "benennung", "naziv", "oznaka", "ime", "назив", "ознака", "наименование",
+    "название", "обозначение",
+)))  # fmt: skip
+"""Columns that name a characteristic beside its nominal size or limits; elsewhere they may name a person."""
 AXES = frozenset({"axis", "ax", "achse", "osa", "os", "оса", "ось"})
 TIMES = frozenset(map(key_of, (
     "time", "zeit", "uhrzeit", "vreme", "cas", "време", "время", "vrijeme", "heure", "ora", "hora", "godzina", "czas", "idő", "időpont",
@@ -148,8 +153,8 @@ def guesses_of(header: tuple[str, ...]) -> dict[str, tuple[int, ...]]:
     beside = next((at for at, each in enumerate(names) if each in AXES), None)
     if "characteristic" in guesses and beside is not None:
         guesses["characteristic"] += (beside,)  # a feature has several: X, Y, D
-    elif "characteristic" not in guesses and "measured" in guesses and "nominal" in guesses:
-        named = names.index("id") if "id" in names else beside
+    elif "characteristic" not in guesses and "measured" in guesses and {"nominal", "upper", "lower"} & guesses.keys():
+        named = next((names.index(each) for each in NAMED if each in names), beside)
         guesses |= {} if named is None else {"characteristic": (named,)}
     if set(COLUMNS) <= set(header):
         guesses |= {name: (header.index(name),) for name in (*ORIGIN, *VERDICT) if name in header}

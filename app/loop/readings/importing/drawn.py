@@ -5,7 +5,7 @@ from collections.abc import Collection
 from app.core.natural import NaturalLimit
 from app.core.number_text import NotANumber, read_number
 from app.files.formats.cell_values import Unreadable, folded
-from app.files.formats.column_names import LOWER_LIMITS, UPPER_LIMITS
+from app.files.formats.column_names import LOWER_LIMITS, LOWER_OF_EITHER, UPPER_LIMITS, UPPER_OF_EITHER
 from app.files.formats.units import UnknownUnit, agreed, in_mm, unit_in, unit_of_name
 from app.language.i18n import _
 from app.loop.readings.aqdef.matching import Content, not_new
@@ -13,6 +13,7 @@ from app.loop.readings.importing.columns import is_both_ways, is_tolerance, is_u
 from app.loop.readings.importing.layout import Drawn, Layout
 
 _SIZES = frozenset(map(folded, (*UPPER_LIMITS, *LOWER_LIMITS)))
+_EITHER = frozenset(map(folded, (*UPPER_OF_EITHER, *LOWER_OF_EITHER)))
 
 
 class _Wrong(ValueError):
@@ -82,8 +83,13 @@ def _limits(name: str, drawn: Drawn, layout: Layout) -> tuple[float | None, floa
     sizes = []
     for side, value in (("lower", lower), ("upper", upper)):
         form_error = lower is None and not nominal  # its upper limit is both
-        if value is None or form_error or folded(layout.named(side)) in _SIZES:
+        column = folded(layout.named(side))
+        by_number = column in _EITHER and nominal and value is not None and abs(value) > abs(nominal) / 2
+        if value is None or form_error or column in _SIZES or by_number:
             sizes.append(value)
+        elif nominal is None and column in _EITHER:
+            words = _("its {column} may be a size or a deviation: the nominal size, which would tell, is missing")
+            raise _Wrong(words.format(column=layout.named(side)))
         elif nominal is None:
             raise _Wrong(
                 _("its {column} is a deviation from a nominal size, which is missing").format(column=layout.named(side))

@@ -590,6 +590,15 @@ def test_a_word_in_a_name_is_no_unit_where_the_unit_is_said(plant: Plant, tmp_pa
     assert [size for size, _at in plant.stored(key)] == [40.001]
 
 
+@pytest.mark.parametrize("head", ["Name,Nominal,Actual", "Bezeichnung,Istwert,Upper,Lower", "Actual,Dimension,USL,LSL"])
+def test_a_name_beside_a_nominal_size_or_limits_is_the_characteristics(tmp_path: Path, head: str) -> None:
+    path, columns = tmp_path / "a.csv", head.split(",")
+    path.write_text(f"{head}\n{','.join('A' if each in {'Name', 'Bezeichnung', 'Dimension'} else '1' for each in columns)}\n")
+    assert look(path, Wishes()).names == ("A",)
+    path.write_text("Time,Name,Actual\n2025-11-18 06:05,Ana,40.001\n")
+    assert look(path, Wishes()).names == (), "alone it may be a person"
+
+
 def test_a_feature_and_its_characteristic_name_it_together(plant: Plant, tmp_path: Path) -> None:
     path = tmp_path / "chr.csv"
     path.write_text("Characteristic,Feature,Actual,Part\nDiameter,Circle 1,40.001,P1\nDiameter,Circle 2,20.002,P1\n")
@@ -631,6 +640,10 @@ def test_of_such_a_table_what_is_missing_is_set_up_with_its_limits(plant: Plant,
     [
         ("Feature;Meas;Nominal;+TOL;-TOL", "A;16.001;16;0.010;0.020", (16.0, 15.98, 16.01)),
         ("Feature;Meas;Nominal;USL;LSL", "A;16.001;16;16.010;15.990", (16.0, 15.99, 16.01)),
+        ("Feature;Meas;Nominal;Upper;Lower", "A;16.001;16;16.010;15.990", (16.0, 15.99, 16.01)),
+        ("Feature;Meas;Nominal;Upper;Lower", "A;16.001;16;0.010;-0.010", (16.0, 15.99, 16.01)),
+        ("Feature;Meas;Nominal;Upper [µm];Lower [µm]", "A;16.001;16;10;-10", (16.0, 15.99, 16.01)),
+        ("Feature;Meas;Upper;Lower", "A;16.001;16.010;15.990", "its Lower may be a size or a deviation"),
         ("Feature;Meas;USL;LSL", "A;16.001;16.010;15.990", (None, 15.99, 16.01)),
         ("Element;Actual;Nominal;Up.Tol;Low.Tol", "A;16.001;16;0.010;-0.020", (16.0, 15.98, 16.01)),
         ("Name;Istwert;Sollwert;Ob.Tol.;Un.Tol.", "Ring (Bore);16.001;16;0.010;-0.020", (16.0, 15.98, 16.01)),
