@@ -30,11 +30,14 @@ LANGUAGES = {
     "cp1254": ("âçğıîöşûüi\N{COMBINING DOT ABOVE}",),
     "cp1257": ("ąčęėįšųūž", "āčēģīķļņšūž"),
     "cp1253": ("αβγδεζηθικλμνξοπρστυφχψωςάέήίϊΐόύϋΰώ",),
+    "cp850": _WESTERN,
+    "cp852": _EASTERN,
+    "cp866": _CYRILLIC,
 }
 """The letters beyond a to z of each language, in lower case, by the encodings that its files have."""
-_OF_ONE_SCRIPT = frozenset({"cp1251", "iso-8859-5", "cp1253"})
+_OF_ONE_SCRIPT = frozenset({"cp1251", "iso-8859-5", "cp866", "cp1253"})
 _WORD = re.compile(r"[^\W\d_]+")
-_SIGN_WITHIN = re.compile(r"(?<=[^\W\d_])[°±²³×„‚¹¼½¾¿§…](?=[^\W\d_])|[\x80-\x9f\N{REPLACEMENT CHARACTER}]")
+_SIGN_WITHIN = re.compile(r"(?<=[^\W\d_])[°±²³×„“”‚‹›«»•¹¼½¾¿§…](?=[^\W\d_])|[\x80-\x9f\N{REPLACEMENT CHARACTER}]")
 # No word of theirs: õ and û at the end, ì, ò and ù within, œ before another letter than i or u; č and ć between consonants; ъ, ы
 # and ь at the beginning.
 _FOREIGN = {
@@ -43,13 +46,14 @@ _FOREIGN = {
     "cyrillic": re.compile(r"\b[ъыь]", re.IGNORECASE),
 }
 _FAMILY = {
-    **dict.fromkeys(("cp1251", "iso-8859-5"), "cyrillic"),
-    **dict.fromkeys(("cp1250", "iso-8859-2"), "eastern"),
-    "cp1252": "western",
+    **dict.fromkeys(("cp1251", "iso-8859-5", "cp866"), "cyrillic"),
+    **dict.fromkeys(("cp1250", "iso-8859-2", "cp852"), "eastern"),
+    **dict.fromkeys(("cp1252", "cp850"), "western"),
 }
 MOST_LINES = 500
 LONGEST_OF_ONE = 2  # letters of a word that may have no Latin letter among them
 _SIGNS = re.compile("[" + re.escape(_SIGNS_OF_ALL) + "]")
+_STRANGE = re.compile("[^\x00-\x7f\\w" + re.escape(_SIGNS_OF_ALL) + "¼½¾¿¡©®™№•‹›]")
 FEWEST = 2  # letters of two bytes
 CAPITALS = 32  # bytes among which the capitals of a script lie
 _BEYOND = re.compile(r"[^\x00-\x7f]")
@@ -98,7 +102,7 @@ def _is_of_a_language(text: str, encoding: str) -> bool:
     if _known(text):
         return True
     words = [word for word in _WORD.findall(_SIGNS.sub(" ", text)) if not word.isascii()]
-    if not words or _SIGN_WITHIN.search(text):
+    if not words or _SIGN_WITHIN.search(text) or _STRANGE.search(text):
         return False
     foreign = _FOREIGN.get(_FAMILY.get(encoding, ""))
     if foreign is not None and any(foreign.search(word) for word in words):

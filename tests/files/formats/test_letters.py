@@ -57,12 +57,41 @@ def test_a_heading_that_is_known_tells_the_encoding(encoding: str) -> None:
 @pytest.mark.parametrize(
     ("encoding", "text"),
     [
-        *(("cp1250", each) for each in ("Külső-ű", "Belső átmérő", "Wałek", "Średnica", "Szerokość", "Průměr", "Šířka", "faţă", "Točkić")),
-        *(("cp1252", each) for each in ("Modèle", "Længde", "Høyde", "Längd å", "Diâmetro furação", "Größe", "Ø40", "Año ñ", "Läbimõõt")),
+        *(
+            ("cp1250", each)
+            for each in (
+                "Külső-ű",
+                "Belső átmérő",
+                "Wałek",
+                "Średnica",
+                "Szerokość",
+                "Průměr",
+                "Šířka",
+                "faţă",
+                "Točkić",
+            )
+        ),
+        *(
+            ("cp1252", each)
+            for each in (
+                "Modèle",
+                "Længde",
+                "Høyde",
+                "Längd å",
+                "Diâmetro furação",
+                "Größe",
+                "Ø40",
+                "Año ñ",
+                "Läbimõõt",
+            )
+        ),
         *(("cp1251", each) for each in ("Вал", "Кольцо ось", "Объём", "Пречник жлеба", "Внутрішній")),
         *(("cp1253", each) for each in ("Διάμετρος", "Ο άξονας", "οπή")),
         *(("cp1254", each) for each in ("İç çap", "Dış-Ş1", "Gövde ağız")),
         *(("cp1257", each) for each in ("Žiedas ė", "Ašis ė")),
+        *(("cp850", each) for each in ("Gehäuse", "Größe")),
+        *(("cp852", each) for each in ("Točkić žleb",)),
+        *(("cp866", each) for each in ("Диаметр", "отверстие")),
     ],
 )
 def test_a_name_of_one_language_keeps_its_letters(encoding: str, text: str) -> None:

@@ -593,7 +593,9 @@ def test_a_word_in_a_name_is_no_unit_where_the_unit_is_said(plant: Plant, tmp_pa
 @pytest.mark.parametrize("head", ["Name,Nominal,Actual", "Bezeichnung,Istwert,Upper,Lower", "Actual,Dimension,USL,LSL"])
 def test_a_name_beside_a_nominal_size_or_limits_is_the_characteristics(tmp_path: Path, head: str) -> None:
     path, columns = tmp_path / "a.csv", head.split(",")
-    path.write_text(f"{head}\n{','.join('A' if each in {'Name', 'Bezeichnung', 'Dimension'} else '1' for each in columns)}\n")
+    path.write_text(
+        f"{head}\n{','.join('A' if each in {'Name', 'Bezeichnung', 'Dimension'} else '1' for each in columns)}\n"
+    )
     assert look(path, Wishes()).names == ("A",)
     path.write_text("Time,Name,Actual\n2025-11-18 06:05,Ana,40.001\n")
     assert look(path, Wishes()).names == (), "alone it may be a person"
