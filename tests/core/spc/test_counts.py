@@ -18,6 +18,31 @@ def test_each_sample_has_limits_of_its_own_size() -> None:
     assert not found.outside.any()
 
 
+JUICE = [12, 15, 8, 10, 4, 7, 16, 9, 14, 10, 5, 6, 17, 12, 22, 8, 10, 5, 13, 11, 20, 18, 24, 15, 9, 12, 7, 13, 9, 6]
+WAFERS = [16, 14, 28, 16, 12, 20, 10, 12, 10, 17, 19, 17, 14, 16, 15, 13, 14, 16, 11, 20, 11, 19, 16, 31, 13]
+COMPUTERS = [10, 12, 8, 14, 10, 16, 11, 7, 10, 15, 9, 5, 7, 11, 12, 6, 8, 10, 7, 5]
+
+
+@pytest.mark.parametrize(
+    ("chart", "counts", "inspected", "published", "outside"),
+    [
+        (CountChart.P, JUICE, 50, (0.0524, 0.2313, 0.4102), [15, 23]),
+        (CountChart.NP, JUICE, 50, (2.62, 11.57, 20.51), [15, 23]),
+        (CountChart.C, WAFERS, None, (4, 16, 28), [24]),
+        (CountChart.U, COMPUTERS, 5, (0.07, 1.93, 3.79), []),
+    ],
+)
+def test_published_charts(
+    chart: CountChart, counts: list[int], inspected: int | None, published: tuple[float, ...], outside: list[int]
+) -> None:
+    """Montgomery, chapter 7: orange juice (also NIST 6.3.3.2), personal computers; NIST/SEMATECH 6.3.3.1: wafers."""
+    found = counts_chart(chart, counts, inspected)
+    places = [len(str(each).partition(".")[2]) for each in published]
+    limits = [float(each[0]) for each in (found.lower, found.centre, found.upper)]
+    assert [round(each, at) for each, at in zip(limits, places, strict=True)] == list(published)
+    assert (np.flatnonzero(found.outside) + 1).tolist() == outside
+
+
 def test_np_and_c_are_p_and_u_times_the_sample() -> None:
     counts = [3, 5, 2, 9, 4, 0, 6]
     p, np_ = (counts_chart(chart, counts, 50) for chart in (CountChart.P, CountChart.NP))

@@ -14,7 +14,7 @@ from app.files.formats import cell_values, delimited, parts_across, spreadsheet
 from app.files.formats.cell_values import slashed
 from app.files.formats.delimited import Row, Unusable
 from app.files.formats.file_times import FileTimes, times_of
-from app.files.formats.headings import TOP, as_wide, heading, others
+from app.files.formats.headings import TOP, as_wide, heading, is_summary, others
 from app.files.formats.units import LENGTHS, UnknownUnit, unit_above, unit_behind, unit_in
 from app.language.i18n import _
 from app.loop.readings.importing.columns import DRAWN, columns_of, fits, guesses_of, nominal_of
@@ -346,6 +346,13 @@ def _drawn(layout: Layout, rows: Iterable[tuple[int, Sequence[Any]]]) -> dict[st
         name = named_in(cells, layout)
         if not name:
             continue
+        if not found and is_summary(name):
+            words = _(
+                "{name} holds limits or statistics: here the characteristics stand side by side, and their rows are parts. Say "
+                "so (--map characteristic=), and the first line of readings (--first-line)"
+            )
+            where = layout.named("characteristic") + ", " + _("line {line}").format(line=line)
+            raise wrong(where, words.format(name=repr(name)))
         if len(name) > LONGEST_NAME:
             raise wrong(layout.named("characteristic") + ", " + _("line {line}").format(line=line), _long_name(name))
         nominal, upper, lower, natural, unit = (

@@ -601,6 +601,19 @@ def test_a_name_beside_a_nominal_size_or_limits_is_the_characteristics(tmp_path:
     assert look(path, Wishes()).names == (), "alone it may be a person"
 
 
+def test_characteristics_side_by_side_below_their_name_are_no_rows_of_limits(plant: Plant, tmp_path: Path) -> None:
+    key, path = plant.shop.another("wide", **D40), tmp_path / "calypso.csv"
+    path.write_text(
+        "Characteristic;Diameter_1;Roundness\nNominal value;40,000;0,000\nUpper tolerance;0,050;0,010\n"
+        "Lower tolerance;-0,050;\nPart 1;40,001;0,003\nPart 2;40,002;0,004\n"
+    )
+    refused = plant.command(path, characteristic=key, mapping="measured=Diameter_1")
+    assert "line 2: 'Nominal value' holds limits or statistics: here the characteristics stand side by side" in refused
+    said = {"mapping": "measured=Diameter_1,characteristic=", "first_line": 5}
+    assert plant.command(path, characteristic=key, **said) == ""
+    assert [size for size, _at in plant.stored(key)] == [40.001, 40.002]
+
+
 def test_a_feature_and_its_characteristic_name_it_together(plant: Plant, tmp_path: Path) -> None:
     path = tmp_path / "chr.csv"
     path.write_text("Characteristic,Feature,Actual,Part\nDiameter,Circle 1,40.001,P1\nDiameter,Circle 2,20.002,P1\n")

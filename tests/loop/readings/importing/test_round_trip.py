@@ -111,6 +111,19 @@ def test_what_was_written_stores_nothing_where_it_comes_from(plant: Database, tm
 
 
 @pytest.mark.parametrize("form", FORMS)
+def test_sizes_in_inches_come_back_as_the_same_readings(database: Database, tmp_path: Path, form: str) -> None:
+    set_up(database)
+    path = table(tmp_path / "a.csv", [1.57449, 1.574487, 1.574493, 1.5744931234])
+    path.write_text(
+        path.read_text().replace("measured\n", "measured [inch]\n").replace("measured\r", "measured [inch]\r")
+    )
+    assert run(database, path, D41).stored == 4
+    first = scalar(database, "SELECT min(measured) FROM reading")
+    assert first == pytest.approx(39.9919698, abs=1e-9)
+    assert imported(database, exported(database, tmp_path / f"out.{form}", D41), D41) == (0, 4)
+
+
+@pytest.mark.parametrize("form", FORMS)
 def test_elsewhere_it_is_stored_once_and_a_later_one_brings_what_is_new(
     plant: Database, tmp_path: Path, form: str
 ) -> None:
