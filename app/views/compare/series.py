@@ -185,7 +185,7 @@ def _cut_since(session: Session, began_at: datetime, machine_id: int, characteri
 
 def _life(life: Life, since: datetime | None) -> str:
     if since is None:
-        return _("first tool") if life.ended_at else _("tool")
+        return _("first tool") if life.ended_at else _("tool since the first reading")
     return _("tool of {since}").format(since=as_read(since, "minutes"))
 
 

@@ -112,3 +112,9 @@ def test_tools_are_chosen_and_cut_where_their_readings_arrived(compared: Shop, v
     ]
     first = {"of": compared.characteristic, "by": "tool", "tool": "1900-01-01T00:00:00Z"}
     assert series(compared, urlencode(first)) == [[1, 2, 3]]
+
+
+def test_a_tool_that_was_never_changed_is_named_so(compared: Shop, viewer: Person) -> None:
+    key = compared.another("unchanged", tool_memory=31)
+    compared.push([1.0, 2.0], key)
+    assert f"Seat {key}, tool since the first reading" in unescape(viewer.open(f"/compare?of={key}&by=tool"))
