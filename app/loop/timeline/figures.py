@@ -26,7 +26,7 @@ NOTE = "note"
 LETTER = (
     6.5  # pixels that a letter of an event takes, about: words that would run into each other are left to the shapes
 )
-UPPER, LOWER = 0.5, -0.5  # rows of the events
+TWO_ROWS, ONE_ROW = (0.5, -0.5), (0.0,)  # of the events
 APART = 16  # pixels between two marks; what lies closer is one
 MOST_NAMED = 8  # of the events of one mark, when it is pointed at
 MOST_LINES = 40  # upward through the chart; more are a fence
@@ -136,19 +136,19 @@ def _marks(events: Sequence[Event], span: tuple[float, float], pixels: float) ->
     return [(_Mark(together), place) for together, place in marks]
 
 
-def _rows(marks: Sequence[tuple[_Mark, float]], most: float) -> list[tuple[_Mark, float, _Side]]:
-    """Each mark with its row and the side on which its word is written: two rows, and a word gives way to the next mark's shape.
+def _rows(marks: Sequence[tuple[_Mark, float]], most: float, rows: Sequence[float]) -> list[tuple[_Mark, float, _Side]]:
+    """Each mark with its row and the side on which its word is written; a word gives way to the next mark's shape.
 
     most: pixels from the left that a word may reach; beside a mark near the end it is on the left, if there is room.
     """
     places: list[tuple[_Mark, float, _Side]] = []
-    latest = {UPPER: -1, LOWER: -1}  # index of the last mark in the row
-    end = {UPPER: -inf, LOWER: -inf}  # where its word ends, px
+    latest = dict.fromkeys(rows, -1)  # index of the last mark in the row
+    end = dict.fromkeys(rows, -inf)  # where its word ends, px
     for mark, place in marks:
         word = LETTER * len(mark.text)
         side: _Side = "right" if place + 12 + word < most else "left"
         start = place - 8 if side == "right" else place - 12 - word
-        row = UPPER if end[UPPER] <= start else min(end, key=lambda row: end[row])
+        row = rows[0] if end[rows[0]] <= start else min(end, key=lambda row: end[row])
         if end[row] > start and side == "left":
             side = None
         if end[row] > place - 8:
@@ -160,15 +160,22 @@ def _rows(marks: Sequence[tuple[_Mark, float]], most: float) -> list[tuple[_Mark
 
 
 def event_lane(
-    events: Sequence[Event], span: tuple[float, float], pixels: float, beside: float, *, lines: bool = True
+    events: Sequence[Event],
+    span: tuple[float, float],
+    pixels: float,
+    beside: float,
+    *,
+    lines: bool = True,
+    low: bool = False,
 ) -> list[Series | Rule | Note]:
     """Marks and words of the events within the span, and in the legend what their shapes mean.
 
     span: of the axis, N pixels wide; moments as seconds (Unix time). beside: pixels that words may reach out at its
-    right. lines: upward through the chart, at what somebody changed. A word is left out where it would not fit.
+    right. lines: upward through the chart, at what somebody changed. low: the lane has room for one row. A word is left out where it
+    would not fit.
     """
     within = [event for event in events if span[0] <= _number(event.at) <= span[1]]
-    places = _rows(_marks(within, span, pixels), pixels + beside)
+    places = _rows(_marks(within, span, pixels), pixels + beside, ONE_ROW if low else TWO_ROWS)
     if not places:
         return []
     main = [mark.main for mark, _row, _side in places]

@@ -120,7 +120,7 @@ def zone_chart(
     return Chart(
         [
             Panel(readings, _size_axis(limits, ruler, sizes, letters, brief=brief), READINGS),
-            Panel(event_lane(events, span, pixels, right), hidden, EVENTS),
+            Panel(event_lane(events, span, pixels, right, low=brief), hidden, EVENTS),
             Panel(offsets, total, OFFSETS),
         ],
         Axis(

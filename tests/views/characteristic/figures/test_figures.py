@@ -256,6 +256,19 @@ class TestLabels:
         assert all(b - a > 0.03 * 2 * high for a, b in itertools.pairwise(places))
 
 
+def test_on_a_phone_the_words_of_events_are_in_one_row() -> None:
+    """Two rows of the low lane lie closer than letters are high: words of neighbours would cover each other."""
+    happened = [Event(at, "oversize", "Oversize") for at in (40, 60, 80, 95)]
+    points = [point(1, 0.0), point(100, 0.0)]
+    (wide,), (phone,) = (
+        traces(zone_chart(points, SHAFT, events=happened, width=width), "events") for width in (1200, 360)
+    )
+    assert (len(set(wide["y"])), set(phone["y"])) == (1, {0.0})
+    near = [Event(at, "oversize", "Oversize") for at in (80, 90)]
+    (wide,) = traces(zone_chart(points, SHAFT, events=near, width=800), "events")
+    assert len(set(wide["y"])) == 2
+
+
 def test_of_many_readings_the_envelope_leads_the_eye() -> None:
     few = zone_chart([point(n, 0.001, average=0.0) for n in range(1, 301)], SHAFT)
     assert not traces(few, "maximum")
