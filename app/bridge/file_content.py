@@ -309,9 +309,10 @@ class _Reader:
             if key is None:
                 self._nobody(item.line, name)
                 continue
-            if characteristic.counts:
+            if characteristic.counts or characteristic.grades:
+                what = "counts parts, it" if characteristic.counts else "holds grades (K2004), it"
                 self.content.skipped += 1
-                self._remark(Remark(item.line, "", name, "counts parts, it measures nothing; passed over"))
+                self._remark(Remark(item.line, "", name, f"{what} measures nothing; passed over"))
                 continue
             if order is None and slashed(item.fields.get("K0004", "")) is Slashed.EITHER:
                 self._fault(item.line, "K0004", "could be day/month or month/day: set day_first to true or false.")

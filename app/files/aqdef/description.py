@@ -61,6 +61,12 @@ class Characteristic:
         """Tell if parts are counted (K2004), not measured."""
         return self.fields.get("K2004", "").lstrip("0") in COUNTING_KINDS
 
+    @property
+    def grades(self) -> bool:
+        """Tell if K2004 says that the values are neither measured sizes nor counts: grades, such as a surface judged by eye as 2."""
+        kind = self.fields.get("K2004", "").lstrip("0")
+        return kind.isascii() and kind.isdigit() and kind not in COUNTING_KINDS
+
 
 @dataclass
 class Description:

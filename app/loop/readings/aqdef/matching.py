@@ -92,6 +92,8 @@ def _content(description: Description, each: Characteristic, unit: str | None) -
     own_unit, obstacle = _unit(word, unit, said)
     if each.counts:
         obstacle = _("counts parts (K2004 = {kind}); Inband keeps measured sizes").format(kind=each.fields["K2004"])
+    elif each.grades:
+        obstacle = _("holds grades, no sizes (K2004 = {kind}, 0 is measured)").format(kind=each.fields["K2004"])
     nominal, lower, upper = (None, None, None) if obstacle else _limits(each.fields, LENGTHS[own_unit], said)
     natural = _natural(each.fields, f"{each.number} {each.name}", nominal, said)
     machine = part.get("K1081", "") or part.get("K1082", "") or _only(description.catalogues.get("K4062", {}))
@@ -110,7 +112,9 @@ def _content(description: Description, each: Characteristic, unit: str | None) -
         tuple(said),
         machine,
         None if obstacle else natural,
-        each.lines.get("K2004" if each.counts else "K2142" if obstacle else "", min(each.lines.values(), default=0)),
+        each.lines.get(
+            "K2004" if each.counts or each.grades else "K2142" if obstacle else "", min(each.lines.values(), default=0)
+        ),
     )
 
 

@@ -838,6 +838,22 @@ AQDEF: dict[str, tuple[list[str], Readings]] = {
         ],
         morning(20.004),
     ),
+    "grades": (
+        [
+            *(
+                "K0100 2",
+                "K1001 {part}",
+                "K2001/1 15",
+                "K2002/1 Surface quality",
+                "K2004/1 4",
+                "K2110/1 1",
+                "K2111/1 9",
+            ),
+            *("K2001/2 D20", "K2101/2 20", "K2110/2 19.9", "K2111/2 20.1", "K2142/2 mm"),
+            row(2, SIX) + C + row(20.004, SIX),
+        ],
+        morning(20.004),
+    ),
 }
 
 
