@@ -293,12 +293,12 @@ def _by_shape(text: str, order: DayOrder | None) -> datetime:
                 "those of spreadsheets, or seconds since 1970-01-01"
             )
         )
-    raise Unreadable(
-        _(
-            "is not a time; write it as 2026-11-21T08:15:02+01:00 or 21.11.2026 08:15:02, or say the form of times "
-            "(--time-format), such as %d.%m.%y %H:%M:%S"
-        )
+    words = _(
+        "is not a time; write it as 2026-11-21T08:15:02+01:00 or 21.11.2026 08:15:02, or say the form of times (--time-format), "
+        "such as {form}"
     )
+    form = "%d.%m.%y %H:%M:%S" if _STROKED_DATE.match(text) is None else "%m/%d/%y %I:%M %p"
+    raise Unreadable(words.format(form=form))
 
 
 def _in_one_way(parts: dict[str, str | None]) -> datetime:

@@ -1,4 +1,5 @@
-from datetime import UTC, datetime
+import re
+from datetime import UTC, date, datetime
 from zoneinfo import ZoneInfo
 
 import pytest
@@ -71,6 +72,13 @@ def test_every_finite_number_is_read_back_exactly(value: float) -> None:
 )
 def test_times_as_people_write_them(text: str) -> None:
     assert moment(text, BELGRADE) == datetime(2026, 11, 21, 7, 15, 2, tzinfo=UTC)
+
+
+def test_a_form_is_named_that_reads_the_time() -> None:
+    for text, form in (("11/18/25 6:05 AM", "%m/%d/%y %I:%M %p"), ("18.11.25 06:05:11", "%d.%m.%y %H:%M:%S")):
+        with pytest.raises(Unreadable, match=re.escape(form)):
+            moment(text, UTC_ZONE)
+        assert moment(text, UTC_ZONE, form).date() == date(2025, 11, 18)
 
 
 def test_parts_of_a_second_and_of_a_day() -> None:
