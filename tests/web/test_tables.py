@@ -171,5 +171,5 @@ def test_the_record_of_changes_is_filtered_by_any_word_of_it(hall: Shop, enginee
     hall.call("PATCH", f"/machines/{hall.machine}", name="Lathe renamed")
     assert engineer.open("/setup/audit?q=MACHINE%20CHANGED").count("machine changed") == 1
     assert "machine changed" not in engineer.open("/setup/audit?q=ring-a")
-    assert "characteristic/ring-a" in engineer.open("/setup/audit?q=ring-a").replace("<wbr>", "")
+    assert "Characteristic ring-a" in engineer.open("/setup/audit?q=ring-a").replace("<wbr>", "")
     assert "Nothing recorded here" in engineer.open("/setup/audit?q=%25")

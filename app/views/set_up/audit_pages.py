@@ -3,7 +3,8 @@
 import re
 from datetime import datetime
 from functools import partial
-from typing import Any
+from typing import Any, NamedTuple
+from urllib.parse import quote
 
 from fastapi import APIRouter, Request, Response
 
@@ -53,7 +54,11 @@ def audit_page(
         caller,
         "audit",
         entries=[
-            (entry, changes(entry.before, entry.after, of_parameters=entry.subject.startswith("characteristic/")))
+            (
+                entry,
+                changes(entry.before, entry.after, of_parameters=entry.subject.startswith("characteristic/")),
+                shown(entry.subject),
+            )
             for entry in part.rows
         ],
         devices=devices.names_of(session, {entry.device_id for entry in part.rows if entry.device_id}),
@@ -62,6 +67,54 @@ def audit_page(
         q=text,
         part=part,
     )
+
+
+class Shown(NamedTuple):
+    """The subject of a change in words, and its page; None: it has none of its own that an engineer may open."""
+
+    words: str
+    path: str | None = None
+
+
+def shown(subject: str) -> Shown:
+    """Return the subject of a change as people read it.
+
+    >>> shown("correction/lathe-2/190")
+    Shown(words='Correction 190, lathe-2', path='/machines/lathe-2/corrections/190')
+    >>> shown("receiver/7").words, shown("average/lathe-1/3/pair/2")
+    ('Receiver 7', Shown(words='average lathe-1 3 pair 2', path=None))
+    """
+    kind, *parts = subject.split("/")
+    words, path = _subjects().get((kind, len(parts)), (None, None))
+    if words is None:
+        return Shown(" ".join([kind.replace("-", " "), *parts]))
+    return Shown(words.format(*parts), path and path.format(*(quote(part, safe="") for part in parts)))
+
+
+def _subjects() -> dict[tuple[str, int], tuple[str, str | None]]:
+    """By the kind of a subject and how many names follow: its words, and the path of its page."""
+    return {
+        ("alarm", 1): (_("Alarm {0}"), "/alarms/{0}"),
+        ("alignment", 1): (_("Alignment {0}"), "/alignments/{0}"),
+        ("catalogue", 1): (_("Catalogue entry {0}"), "/setup/reactions"),
+        ("characteristic", 1): (_("Characteristic {0}"), "/setup/characteristics/{0}"),
+        ("correction", 2): (_("Correction {1}, {0}"), "/machines/{0}/corrections/{1}"),
+        ("kinematics", 2): (_("Kinematics version {1}, {0}"), "/kinematics/machines/{0}"),
+        ("machine", 1): (_("Machine {0}"), "/setup/machines/{0}"),
+        ("maintenance", 1): (_("Maintenance {0}"), "/maintenance"),
+        ("note", 1): (_("Note {0}"), "/notes/{0}"),
+        ("person", 1): (_("Person {0}"), None),
+        ("quarantine", 1): (_("Quarantine {0}"), "/quarantines/{0}"),
+        ("quarantine", 2): (_("Part {1}, quarantine {0}"), "/quarantines/{0}"),
+        ("reaction-plan", 1): (_("Reaction plan {0}"), "/setup/reactions/{0}"),
+        ("reading", 2): (_("Reading {1} of {0}"), "/characteristics/{0}/readings/{1}"),
+        ("receiver", 1): (_("Receiver {0}"), None),
+        ("reports", 1): (_("Report {0}"), "/reports"),
+        ("signal", 1): (_("Signal {0}"), "/signals/{0}"),
+        ("station", 1): (_("Station {0}"), None),
+        ("tool", 2): (_("Tool {1}, {0}"), "/machines/{0}/tools/{1}"),
+        ("wall-screen", 1): (_("Wall screen {0}"), None),
+    }
 
 
 def changes(

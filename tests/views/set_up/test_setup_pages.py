@@ -338,6 +338,15 @@ def test_the_record_of_changes_has_words(engineer: Person, shop: Shop) -> None:
     kept = engineer.open(f"/setup/audit?actor={ACTOR}&q=maintenance")
     assert re.search(r"stopping anyway</span>\s*<ins>yes", kept)
     assert not re.search(r"<ins>\d{4}-\d\d-\d\dT", kept)
+    of_what = dict(
+        re.findall(
+            r'<a href="(/[^"]+)">([^<]+)</a>\s+·\s+<a class="quiet nowrap"',
+            engineer.open("/setup/audit").replace("<wbr>", ""),
+        )
+    )
+    assert of_what[f"/setup/characteristics/{shop.characteristic}"] == f"Characteristic {shop.characteristic}"
+    assert "Nothing recorded here" not in engineer.open(f"/setup/audit?subject=machine/{shop.machine}")
+    engineer.open(f"/setup/characteristics/{shop.characteristic}")
 
 
 def test_every_page_of_setup_opens(admin: Person, shop: Shop) -> None:
