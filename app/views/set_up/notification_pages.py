@@ -17,6 +17,7 @@ from app.loop.alarms.kinds import kinds
 from app.loop.notifications import actions, browser_actions, queries
 from app.loop.notifications.calendar_queries import coming
 from app.loop.notifications.schemas import OwnAddressIn, OwnBrowserIn, ReceiverIn, RouteIn, shown_address
+from app.loop.notifications.tables import Receiver
 from app.loop.notifications.wording import (
     changes_word,
     delivery_word,
@@ -339,6 +340,8 @@ def _own(
         form=form,
         errors={} if of_browser is not None else errors,
         browser=browser,
+        beyond=_beyond(row),
+        browser_beyond=_beyond(browser),
         browser_form=_quiet(browser.quiet if browser else ()) if of_browser is None else of_browser,
         browser_errors={} if of_browser is None else errors,
         last=next(iter(queries.deliveries(session, receiver_id=browser.id, limit=1)), None) if browser else None,
@@ -346,6 +349,15 @@ def _own(
         problem=error if error and not error.errors else None,
         done=done,
     )
+
+
+def _beyond(row: Receiver | None) -> dict[str, Any] | None:
+    """All quiet hours in words, and absence, where the form does not hold them: more than one, not every day, or a date."""
+    if row is None:
+        return None
+    held = len(row.quiet) <= 1 and all(set(each["days"]) == set(EVERY_DAY) for each in row.quiet)
+    away = row.away_until if row.away_until and row.away_until > datetime.now(UTC) else None
+    return None if held and away is None else {"hours": [] if held else list(map(when, row.quiet)), "away": away}
 
 
 def _quiet(stored: Sequence[Any]) -> dict[str, str]:

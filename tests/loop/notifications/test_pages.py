@@ -165,6 +165,9 @@ def test_what_ones_own_form_does_not_hold_is_kept(server: Server, page: str, fie
     quiet = [{"days": [6, 7], "begins": "00:00", "ends": "00:00"}, {"days": [1, 2], "begins": "20:00", "ends": "06:00"}]
     given = fields | {"quiet": quiet, "away_until": "2099-01-01T00:00:00Z"}
     set_up = viewer.browser.put(path, json=given, headers={"X-CSRF-Token": viewer.csrf()}).json()
+    text = viewer.open("/account/notifications")
+    assert "Sat, Sun 00:00–00:00; Mon, Tue 20:00–06:00" in text
+    assert re.search(r"Away until .*>1 Jan 2099", text)
     shown: dict[str, Any] = {"quiet-begins": "00:00", "quiet-ends": "00:00"}
     viewer.send(f"/account/notifications{page}", **fields | shown)
     kept = viewer.browser.get(path).json()
