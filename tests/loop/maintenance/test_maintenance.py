@@ -7,6 +7,7 @@ from zoneinfo import ZoneInfo
 import pytest
 
 from app.errors import Invalid
+from app.language.numbers import as_read
 from app.language.times import in_zone
 from app.loop.maintenance.pages import as_typed
 from app.loop.maintenance.schemas import MaintenanceIn
@@ -193,6 +194,15 @@ class TestEnding:
         assert f"Maintenance {made['id']} ended at" in again["detail"]
         audit = shop.call("GET", f"/audit?subject=maintenance/{made['id']}")["items"]
         assert [each["action"] for each in audit] == ["maintenance ended", "maintenance entered"]
+
+    def test_the_page_says_until_when_it_was_and_what_was_planned(self, shop: Shop, server: Server) -> None:
+        made = enter(shop, ends=ahead(6))
+        path = f"/maintenance?machine={shop.machine}"
+        viewer = Person(server, "viewer")
+        assert "planned:" not in viewer.open(path)
+        ended = shop.call("POST", f"/maintenance/{made['id']}/end")
+        row = viewer.open(path).partition("<tbody")[2]
+        assert row.index(as_read(datetime.fromisoformat(ended["ended_at"]), "minutes")) < row.index("planned:")
 
     def test_what_is_planned_is_cancelled(self, shop: Shop) -> None:
         made = enter(shop, begins=ahead(5), ends=ahead(6))
