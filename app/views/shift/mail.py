@@ -6,8 +6,9 @@ from urllib.parse import urlencode
 
 from sqlalchemy.orm import Session
 
+from app.core.spc.capability import CAPABLE
 from app.language.i18n import _, ngettext
-from app.language.numbers import NOTHING, age, as_read, plain_um
+from app.language.numbers import age, as_read, fixed, plain_um
 from app.loop.alarm_response.wording import kind_word
 from app.views.shift import queries
 from app.views.shift.queries import Shift
@@ -51,18 +52,11 @@ def _text(found: Shift) -> str:
         _("Parts: {parts}, in tolerance {inside}, out of tolerance {outside}").format(
             parts=made.parts, inside=made.inside, outside=made.outside
         ),
-        _("Alarms: {n}, acknowledged after {median} (median), {longest} at most; {active} still active").format(
-            n=answered.alarms,
-            median=_after(answered.median),
-            longest=_after(answered.longest),
-            active=answered.active,
-        ),
-        _("Corrections: {n}, {held} held back, {not_taken} not taken, the largest {largest}").format(
-            n=made.corrections,
-            held=made.held,
-            not_taken=made.not_taken,
-            largest=plain_um(made.largest),
-        ),
+        _alarms(answered),
+        _("Corrections: {n}, {held} held back, {not_taken} not taken").format(
+            n=made.corrections, held=made.held, not_taken=made.not_taken
+        )
+        + ("" if made.largest is None else _(", the largest {largest}").format(largest=plain_um(made.largest))),
         _("Tool changes: {n}").format(n=found.tool_changes),
     ]
     if len(found.machines) > 1:
@@ -79,7 +73,12 @@ def _text(found: Shift) -> str:
         parts = max(0, round(each.inputs.parts_left or 0))
         words = ngettext("limit in {n} part", "limit in {n} parts", parts).format(n=parts)
         lines.append(f"- {each.row.characteristic.name}: {words}")
-    lines += [f"- {each.row.characteristic.name}: {each.inputs.ppk or 0.0:.2f} < 1.33" for each in coming.below[:MOST]]
+    lines += [
+        _("- {name}: index {index}, below {limit}").format(
+            name=each.row.characteristic.name, index=fixed(each.inputs.ppk, 2), limit=fixed(CAPABLE, 2)
+        )
+        for each in coming.below[:MOST]
+    ]
     return "\n".join(lines)
 
 
@@ -89,5 +88,12 @@ def _machine(each: queries.OfMachine) -> str:
     )
 
 
-def _after(time: timedelta | None) -> str:
-    return NOTHING if time is None else age(time.total_seconds())
+def _alarms(answered: queries.Answered) -> str:
+    count = _("Alarms: {n}").format(n=answered.alarms)
+    if answered.alarms and (answered.median is None or answered.longest is None):
+        count += _(", none acknowledged")
+    elif answered.median is not None and answered.longest is not None:
+        count += _(", acknowledged after {median} (median), {longest} at most").format(
+            median=age(answered.median.total_seconds()), longest=age(answered.longest.total_seconds())
+        )
+    return count + (_("; {n} still active").format(n=answered.active) if answered.active else "")
