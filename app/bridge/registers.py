@@ -379,7 +379,8 @@ class RegisterLink:
         if self._near(location, held, after) or not self._near(location, held, before):
             await self._note_direct(order, held)
             return False
-        if await self.registers.against_writing(location):
+        if reason := await self.registers.against_writing(location):
+            self.remark = f"Correction {order.number} waits: {reason}"
             return False
         await self.registers.write_offset(location, round(after, 6))
         return True

@@ -525,6 +525,7 @@ def test_a_direct_write_waits_for_its_gate() -> None:
         await link.offer([Order(18, 3, 0.0, 0.010)])
         assert await link.outcomes() == []
         assert model.offsets[PLACE] == 0.0
+        assert link.remark == "Correction 18 waits: The program is running."
         registers.may_write = None
         await link.offer([Order(18, 3, 0.0, 0.010)])
         assert model.offsets[PLACE] == pytest.approx(0.010)

@@ -205,8 +205,10 @@ def _not_taken(alarm: Alarm) -> str:
         "cut with the offset of before.",
         count,
     ).format(n=count, first=data.get("first"), tool=alarm.tool_memory, since=since)
-    if not data.get("bridge") or data.get("carried", True):
+    if not data.get("bridge"):
         return text
+    if data.get("carried", True):
+        return f"{text} " + _("Its bridge says: {said}").format(said=data["said"]) if data.get("said") else text
     return f"{text} " + _("Its bridge carries no corrections: enter them at the control and confirm them here.")
 
 

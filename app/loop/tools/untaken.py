@@ -36,8 +36,8 @@ SETTLES = timedelta(minutes=5)
 class Untaken(NamedTuple):
     """Pending corrections of a tool. waiting: how many; most: of one characteristic; first, since: the oldest; measured: its last part.
 
-    reason: why its bridge holds them back, if it says so and not because of a hold. bridge: the machine has one; carried: which
-    brings corrections.
+    reason: why its bridge holds them back, if it says so and not because of a hold. said: what it says of the control. bridge: the
+    machine has one; carried: which brings corrections.
     """
 
     machine_id: int
@@ -49,6 +49,7 @@ class Untaken(NamedTuple):
     since: datetime
     measured: datetime | None
     reason: str | None
+    said: str | None
     bridge: bool
     carried: bool
     now: datetime
@@ -162,7 +163,7 @@ def untaken(session: Session, machine_id: int | None = None) -> list[Untaken]:
     )
     query = (
         select(tools, Machine.key, measured.label("measured"), Connection.held_back, Connection.hold_all)
-        .add_columns(Connection.locations, func.clock_timestamp().label("now"))
+        .add_columns(Connection.locations, Connection.detail, func.clock_timestamp().label("now"))
         .join(Machine, Machine.id == tools.c.machine_id)
         .outerjoin(Connection, Connection.machine_id == tools.c.machine_id)
         .order_by(tools.c.machine_id, tools.c.tool_memory)
@@ -185,6 +186,7 @@ def _untaken(row: Row[Any]) -> Untaken:
         since=row.since,
         measured=row.measured,
         reason=reason,
+        said=row.detail,
         bridge=row.hold_all is not None,
         carried=any(place.get("corrected", True) for place in row.locations or ()),
         now=row.now,
@@ -197,6 +199,7 @@ def _values(waiting: Untaken) -> dict[str, Any]:
         "first": waiting.first,
         "since": waiting.since.isoformat(),
         "reason": waiting.reason,
+        "said": waiting.said,
         "bridge": waiting.bridge,
         "carried": waiting.carried,
     }

@@ -79,6 +79,13 @@ DATA: dict[str, list[dict[str, Any]]] = {
     "corrections_not_taken": [
         {"waiting": 1, "first": 12, "since": _AT},
         {"waiting": 4, "first": 12, "since": _AT, "bridge": True, "carried": False},
+        {
+            "waiting": 4,
+            "first": 12,
+            "since": _AT,
+            "bridge": True,
+            "said": "Tool 3 is in use: its wear is not written now.",
+        },
     ],
     "unusual_gain": [_GAIN | {"verdict": verdict} for verdict in ("none", "weak", "strong", "opposite")],
     "characteristics_disagree": [{"down": "a", "up": "b", "mean_down": -0.02, "mean_up": 0.02, "times": 6}],

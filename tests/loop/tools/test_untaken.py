@@ -87,6 +87,16 @@ def test_a_bridge_that_carries_no_corrections_is_named(shop: Shop, runs: Runs, k
     assert "Its bridge carries no corrections" in alarm["text"]
 
 
+def test_what_the_bridge_says_of_the_control_is_in_the_alarm(shop: Shop, runs: Runs) -> None:
+    """Where it writes offsets itself: why the control lets it not."""
+    for size in (6, 12, 18, 24, 30):
+        shop.read(size)
+    waited(shop, 6)
+    beat(shop, locations=[{"tool_memory": 3}], detail="Correction 1 waits: tool 3 is in use.")
+    [alarm] = runs(3)
+    assert alarm["text"].endswith("Its bridge says: Correction 1 waits: tool 3 is in use.")
+
+
 def test_what_the_bridge_holds_back_is_reported_at_once_with_its_reason(shop: Shop, runs: Runs) -> None:
     shop.read(6)
     beat(shop, held_back=[HELD], hold_all=True)
