@@ -73,6 +73,7 @@ def _as_if_done(pending: PendingWrites, stream: PendingStream) -> None:
     stream.paused_by = None
     stream.alarms.clear()
     stream.parts.clear()  # the sizes are as they were with other corrections: they say nothing of the effect of these
+    stream.arrivals.clear()
     pending.tool_alarms.clear()
     pending.raised.clear()
     pending.issued.clear()

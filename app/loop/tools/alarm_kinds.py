@@ -86,8 +86,31 @@ OPPOSITE_EFFECT = register(
 )
 
 
+def _behind(alarm: Alarm) -> str:
+    data = alarm.data
+    text = _(
+        "In each of the newest {n} readings of {characteristic} measured_at lies {lag} before its receipt: the clock of the machine is "
+        "behind, or each reading waits as long on its way."
+    )
+    counted = _(
+        "Parts count as cut without corrections that tool {tool} had. Nothing is corrected through it until this alarm is answered."
+    )
+    if data.get("before"):
+        counted = _(
+            "Parts count as cut before tool {tool} was changed. Nothing is corrected through it until this alarm is answered."
+        )
+    return f"{text} {counted}".format(
+        characteristic=data.get("characteristic"),
+        lag=age(data.get("lag") or 0.0),
+        n=data.get("readings"),
+        tool=alarm.tool_memory,
+    )
+
+
 def _early(alarm: Alarm) -> str:
     data = alarm.data
+    if data.get("by") == "clock":
+        return _behind(alarm)
     than = {
         "machined_at": _("machined_at says ({lag} before the reading came in): the clock of the machine is behind"),
         "correction_in_effect": _("correction_in_effect says: the number sent is not that of the last one applied"),

@@ -67,6 +67,10 @@ DATA: dict[str, list[dict[str, Any]]] = {
     "early_effect": [
         {"characteristic": "seat", "share": 0.98, "error": 0.09, "after": 1, "lag": 7200.0, "by": by}
         for by in ("machined_at", "correction_in_effect", "confirmation")
+    ]
+    + [
+        {"characteristic": "seat", "by": "clock", "before": before, "lag": 7200.0, "readings": 5}
+        for before in (False, True)
     ],
     "correction_in_doubt": [
         {"characteristic": "seat", "number": 17, "of_tool": 7} | more

@@ -4,6 +4,7 @@ from datetime import UTC, datetime, timedelta
 from typing import Any
 
 import numpy as np
+import psycopg
 import pytest
 
 from tests.shop import Shop
@@ -92,3 +93,83 @@ def test_a_number_that_is_behind_is_found_as_well(shop: Shop) -> None:
         number = answer["correction"]["number"] if answer["correction"] else number
     (alarm,) = [each for each in shop.alarms() if each["kind"] == "early_effect"]
     assert "correction_in_effect says" in alarm["text"]
+
+
+# --- a clock that is behind, on a machine whose readings come one by one, as they are measured
+
+
+AGED = (
+    "UPDATE reading SET received_at = received_at - %(by)s, measured_at = measured_at - %(by)s, machined_at = machined_at - %(by)s",
+    "UPDATE correction SET created_at = created_at - %(by)s, applied_at = applied_at - %(by)s",
+    "UPDATE stream SET last_measured_at = last_measured_at - %(by)s",
+    "UPDATE tool SET reset_at = reset_at - %(by)s, changed_at = changed_at - %(by)s",
+    "UPDATE machine_state SET version = version + 1",
+)
+OF_MACHINE = " WHERE machine_id = (SELECT id FROM machine WHERE key = %(machine)s)"
+
+
+class Live:
+    """The same lathe at its own pace: a part a minute, of which the server hears at once. Its time is moved in place of waiting.
+
+    behind: its clock.
+    """
+
+    def __init__(self, shop: Shop, behind: timedelta) -> None:
+        self.shop, self.behind = shop, behind
+        self.key = shop.another("live", tool_memory=4, average_memory=6, **FOLLOWS | {"weighting_factor": 2})
+        self.chance, self.offset, self.sizes, self.actions = np.random.default_rng(4), 0.0, list[float](), list[str]()
+
+    def wait(self, seconds: float) -> None:
+        """Let so much time pass: for the server all was as much longer ago."""
+        with psycopg.connect(self.shop.server.database.dsn) as connection:
+            connection.execute("SET session_replication_role = replica")  # else it is refused: they are facts
+            for each in AGED:
+                connection.execute(each + OF_MACHINE, {"by": timedelta(seconds=seconds), "machine": self.shop.machine})
+
+    def part(self) -> None:
+        """Cut a part, measure the one that comes out of the buffer, apply what the server wants."""
+        self.wait(60)
+        size = 0.5 * len(self.sizes) + self.offset * 1000 + float(self.chance.normal(0, 0.3))
+        self.sizes.append(size)
+        now = (datetime.now(UTC) - self.behind).isoformat()
+        answer = self.shop.read(round(size, 2), self.key, machined_at=now, measured_at=now)
+        self.actions.append(answer["action"])
+        if answer["action"] == "correct":
+            self.offset = round(self.offset + answer["correction"]["amount"], 9)
+            self.shop.correction(answer["correction"]["number"], "applied")
+
+    def named(self) -> list[Any]:
+        return [each for each in self.shop.alarms() if each["kind"] == "early_effect"]
+
+    @property
+    def out(self) -> int:
+        return sum(abs(size) > 8 for size in self.sizes)
+
+
+def test_a_machine_whose_every_reading_is_as_late_is_paused_before_a_part_is_out(shop: Shop) -> None:
+    """Of 60 parts 25 to 30 would be out: with k 2 the loop follows wear by half, and sizes show nothing."""
+    live = Live(shop, timedelta(hours=3))
+    while not live.named():
+        live.part()
+        assert len(live.sizes) < 15
+    [alarm] = live.named()
+    assert live.out == 0
+    assert "the clock of the machine is behind" in alarm["text"]
+    assert "measured_at" in alarm["text"]
+    shop.acknowledge(alarm["id"], "noted")
+    live.behind = timedelta()
+    for _part in range(12):
+        live.part()
+    assert (live.out, live.named()) == (0, [])
+    assert "correct" in live.actions[-6:]
+
+
+def test_after_a_tool_change_a_clock_that_is_behind_is_named_as_well(shop: Shop) -> None:
+    """Parts count as cut with the edge that went out, and nothing is corrected for as long as the clock is behind."""
+    live = Live(shop, timedelta(hours=1))
+    shop.call("POST", f"/machines/{shop.machine}/tools/4/change", offset=0.0, reason="worn")
+    while not live.named():
+        live.part()
+        assert len(live.sizes) < 10
+    [alarm] = live.named()
+    assert "before tool 4 was changed" in alarm["text"]

@@ -12,6 +12,7 @@ from datetime import datetime
 import numpy as np
 from numpy.typing import NDArray
 
+from app.core import clock
 from app.core.decision.decide import Decision, outstanding_effect
 from app.core.decision.limits import ZONES
 from app.core.decision.loops import SERIES, Quiet, Series, quiet_run, rows_of
@@ -37,7 +38,7 @@ from app.loop.readings.writer.corrections_in_effect import CorrectionsInEffect, 
 from app.loop.readings.writer.decide import decide_reading
 from app.loop.readings.writer.doubts import fell
 from app.loop.readings.writer.pending import PendingAverage, PendingStream, PendingWrites, Stored, Verdict
-from app.loop.readings.writer.snapshot import Part
+from app.loop.readings.writer.snapshot import Arrival, Part
 
 FEWEST = 64  # readings that are worth making columns of
 NEVER = -(2**62)
@@ -175,6 +176,7 @@ class ColumnarReadings:
         self._write_average(stream.average)
         if stream.tool is not None:
             stream.parts += self._parts(index, self._remembered[index], at)
+            stream.arrivals += self._arrivals(index, self._remembered[index], at)
         self._remembered[index] = at + 1
 
     def _parts(self, index: int, first: int, end: int) -> list[Part]:
@@ -188,6 +190,14 @@ class ColumnarReadings:
                 decided, deviation = float(self._decided.decided[at]), float(self._decided.deviation[at])
                 parts.append(Part(int(self._decided.sequence[at]), deviation, compensated, decided - deviation))
         return parts
+
+    def _arrivals(self, index: int, first: int, end: int) -> list[Arrival]:
+        """Return the times of the newest quiet readings of a stream between two positions."""
+        quiet = np.flatnonzero(self._quiet[first:end] & (self._stream_of[first:end] == index))[-clock.FEWEST :] + first
+        return [
+            Arrival(int(self._decided.sequence[at]), self.now, EPOCH + int(self._times[at]) * MICROSECOND)
+            for at in quiet.tolist()
+        ]
 
     def _write_average(self, memory: PendingAverage | None) -> None:
         if memory is not None:

@@ -25,7 +25,7 @@ from app.loop.readings.records import Entry
 from app.loop.readings.schemas import ReadingIn
 from app.loop.readings.writer.corrections_in_effect import confirm, corrections_in_effect, issued_total
 from app.loop.readings.writer.doubts import doubt
-from app.loop.readings.writer.opposed import name_clock, name_correction, part_of, pauses, remember
+from app.loop.readings.writer.opposed import name_correction, part_of, pauses, remember
 from app.loop.readings.writer.pending import (
     PendingAlarm,
     PendingCorrection,
@@ -35,6 +35,8 @@ from app.loop.readings.writer.pending import (
     Stored,
     Verdict,
 )
+from app.loop.readings.writer.slow_clock import behind, lag_with, name_clock, told_by_time
+from app.loop.readings.writer.snapshot import Arrival
 
 
 def decide_one_by_one(
@@ -96,11 +98,12 @@ def decide_reading(pending: PendingWrites, entry: Entry, reading: ReadingIn, now
     empirical_value = average.empirical_value if average and not reading.is_by_hand else 0.0
     results = results_of(parameters, reading.touches or (), points, empirical_value) if points else None
     deviation = deviation_of(measured, parameters.target, empirical_value)
-    course = None
-    if parameters.plausible_jump is not None and compensated is not None:
-        course = uncorrected(deviation, compensated, parameters.factor)
-    jump = course is not None and is_jump(course, stream.level, parameters.plausible_jump or 0.0)
+    course, jump = _course(stream, deviation, compensated)
     paused_by = stream.paused_by if tool is None or stream.paused_by is not None else tool.paused_by
+    timed = told_by_time(stream, reading, compensated, previous_tool=previous_tool)
+    lag = lag_with(stream, Arrival(sequence, now, measured_at), timed=timed)
+    if lag is not None and paused_by is not None:  # a part that is out is not taken for one on the way
+        previous_tool, outstanding, amounts = False, (), ()
     state = LoopState(
         average.average if average else 0.0,
         issued_total(pending, tool) if parameters.max_total is not None else 0.0,
@@ -121,11 +124,15 @@ def decide_reading(pending: PendingWrites, entry: Entry, reading: ReadingIn, now
     late = stream.last_measured_at is not None and measured_at < stream.last_measured_at
     newest = None if compensated is None or late or jump or fault else part_of(sequence, decision, compensated)
     opposed = pauses(pending, stream, newest, reading, now) if decision.amount is not None and newest else None
+    if opposed is None and paused_by is None and lag is not None:
+        opposed = behind(pending, stream, decision, lag, previous_tool=previous_tool)
+    if opposed is not None and lag is not None:
+        outstanding, judged = (), partial(judged, outstanding=0.0, previous_tool=False)
     if opposed is not None:
         paused_by, decision = opposed, judged(state=state._replace(paused=True))
     alarms = [_signal(pending, stream, signal, sequence, decision, results, fault) for signal in decision.alarms]
     name_correction(alarms, stream, newest)
-    name_clock(alarms, tool, reading, compensated, now)
+    name_clock(alarms if timed else (), reading, now)
     asked = doubt(pending, stream, reading, sequence)
     alarms += [alarm for alarm in (opposed, asked) if alarm is not None]
     correction = (
@@ -149,13 +156,28 @@ def decide_reading(pending: PendingWrites, entry: Entry, reading: ReadingIn, now
         results=results,
     )
     _move_along(verdict, course, jump=jump)
+    _note(pending, verdict)
+    return verdict
+
+
+def _note(pending: PendingWrites, verdict: Verdict) -> None:
+    """Keep a decided reading for the writes of its transaction, and for those behind it that have its key."""
+    number, key = verdict.stream.entry.characteristic_id, verdict.reading.key
     if pending.snapshot.plans:
         verdict.measure_next = pending.measure_next(verdict)
-    pending.touched[entry.characteristic_id] = stream
+    pending.touched[number] = verdict.stream
     pending.verdicts.append(verdict)
-    if reading.key is not None:
-        pending.by_key[entry.characteristic_id, reading.key] = verdict
-    return verdict
+    if key is not None:
+        pending.by_key[number, key] = verdict
+
+
+def _course(stream: PendingStream, deviation: float, compensated: float | None) -> tuple[float | None, bool]:
+    """Return the deviation without corrections, where jumps are looked for, and if it is one; mm."""
+    parameters = stream.parameters
+    if parameters.plausible_jump is None or compensated is None:
+        return None, False
+    course = uncorrected(deviation, compensated, parameters.factor)
+    return course, is_jump(course, stream.level, parameters.plausible_jump)
 
 
 def _move_along(verdict: Verdict, course: float | None, *, jump: bool) -> None:

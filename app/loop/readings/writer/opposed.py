@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from app.core.decision.decide import Decision, ReadingAlarm
+from app.core.decision.decide import Decision
 from app.core.decision.limits import Zone, nanometres
 from app.core.early import acts_early
 from app.core.gain import LONGEST, Step, against, expected_scatter, opposed
@@ -54,7 +54,7 @@ def pauses(
     if found is not None:
         steps = [_said(tool, step) for step in (found.first, found.second)]
         gain = {"gain": round(found.gain, 3), "error": round(found.error, 3), "corrections": steps}
-        return _paused(pending, stream, tool, newest, OPPOSITE, gain)
+        return paused(pending, stream, tool, newest.deviation, OPPOSITE, gain)
     if parameters.rules.of_tool or not any(part.outstanding for part in parts):
         return None
     outstanding = np.array([part.outstanding for part in parts])
@@ -66,23 +66,24 @@ def pauses(
         said["by"] = "correction_in_effect"
     elif reading.machined_at is not None:
         said |= {"by": "machined_at", "lag": round((now - reading.machined_at).total_seconds(), 1)}
-    return _paused(pending, stream, tool, newest, EARLY, said)
+    return paused(pending, stream, tool, newest.deviation, EARLY, said)
 
 
-def _paused(
-    pending: PendingWrites, stream: PendingStream, tool: PendingTool, newest: Part, kind: str, data: dict[str, Any]
+def paused(
+    pending: PendingWrites, stream: PendingStream, tool: PendingTool, deviation: float, kind: str, data: dict[str, Any]
 ) -> PendingAlarm:
+    """Pause the tool with the reading that is decided now, of this deviation, mm; the alarm."""
     alarm = PendingAlarm(
         machine_id=tool.machine_id,
         characteristic_id=None,
         tool_memory=tool.number,
         kind=kind,
-        sequence=newest.sequence,
-        last_sequence=newest.sequence,
+        sequence=stream.sequence + 1,
+        last_sequence=stream.sequence + 1,
         count=1,
         data={
             "characteristic": stream.entry.characteristic,
-            "deviation": newest.deviation,
+            "deviation": deviation,
             "factor": stream.parameters.factor,
             **data,
         },
@@ -109,23 +110,6 @@ def name_correction(alarms: Sequence[PendingAlarm], stream: PendingStream, newes
     if found is not None:
         for alarm in alarms:
             alarm.data["against"] = _said(stream.tool, found)
-
-
-def name_clock(
-    alarms: Sequence[PendingAlarm],
-    tool: PendingTool | None,
-    reading: ReadingIn,
-    compensated: float | None,
-    now: datetime,
-) -> None:
-    """Say in alarms about a deviation that its part counts as cut without applied corrections by the machine's clock alone."""
-    if tool is None or compensated is None or reading.machined_at is None or reading.correction_in_effect is not None:
-        return
-    if nanometres(tool.total) == nanometres(compensated):
-        return
-    for alarm in alarms:
-        if alarm.kind != ReadingAlarm.PROBE_FAULT.value:
-            alarm.data["lag"] = round((now - reading.machined_at).total_seconds(), 1)
 
 
 def _said(tool: PendingTool, step: Step) -> dict[str, Any]:

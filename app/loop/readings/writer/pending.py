@@ -12,6 +12,7 @@ from typing import Any, NamedTuple
 
 from msgspec import structs
 
+from app.core.clock import FEWEST
 from app.core.decision.decide import Decision
 from app.core.decision.limits import Zone
 from app.core.gain import LONGEST
@@ -22,6 +23,7 @@ from app.loop.readings.schemas import ReadingIn
 from app.loop.readings.writer.snapshot import (
     MOST_APPLIED,
     MOST_NAMED,
+    Arrival,
     LoadedAverage,
     LoadedCorrection,
     LoadedPlan,
@@ -184,6 +186,7 @@ class PendingStream:
     level: float | None
     level_sequence: int | None
     parts: list[Part]
+    arrivals: list[Arrival]
     level_moved: bool = False
     alarms: dict[str, PendingAlarm] = field(default_factory=dict)
     last: "Verdict | None" = None
@@ -198,6 +201,7 @@ class PendingStream:
             level=self.level,
             level_sequence=self.level_sequence,
             parts=self.parts[-LONGEST:],
+            arrivals=self.arrivals[-FEWEST:],
         )
 
 
@@ -258,6 +262,7 @@ class PendingWrites:
                 level=start.level,
                 level_sequence=start.level_sequence,
                 parts=list(start.parts),
+                arrivals=list(start.arrivals),
             )
         return stream
 

@@ -95,11 +95,19 @@ class Part(NamedTuple):
     outstanding: float
 
 
+class Arrival(NamedTuple):
+    """Times of a reading: it came in, and was measured as it says; where it says nothing, that is when it came in."""
+
+    sequence: int
+    received_at: datetime
+    measured_at: datetime
+
+
 class LoadedStream(msgspec.Struct, frozen=True, kw_only=True, array_like=True):
     """The state of one characteristic after its last reading.
 
     average, tool: locations, None without one. level: the deviation expected without corrections, mm; kept where jumps
-    are looked for. gain_from: readings up to this one say nothing of the gain of corrections; parts: the newest, in order.
+    are looked for. gain_from: readings up to this one say nothing of the gain of corrections; parts, arrivals: the newest, in order.
     forms: the characteristics whose readings are results of these, each with the result.
     """
 
@@ -114,6 +122,7 @@ class LoadedStream(msgspec.Struct, frozen=True, kw_only=True, array_like=True):
     level_sequence: int | None = None
     gain_from: int = 0
     parts: Sequence[Part] = ()
+    arrivals: Sequence[Arrival] = ()
     forms: Sequence[tuple[Entry, FormResult]] = ()
 
 

@@ -9,6 +9,7 @@ from typing import Any
 
 import msgspec
 
+from app.core.clock import FEWEST
 from app.core.control_plan import MISSED_ALARM
 from app.core.decision.limits import Zone
 from app.core.gain import LONGEST
@@ -81,6 +82,13 @@ SELECT json_build_object(
                             SELECT FROM exclusion e WHERE e.machine_id = r.machine_id
                                 AND e.characteristic_id = r.characteristic_id AND e.sequence = r.sequence
                         )
+                ) END, '[]'),
+                coalesce(CASE WHEN t.number IS NOT NULL THEN (
+                    SELECT json_agg(json_build_array(r.sequence, r.received_at, r.measured_at)
+                        ORDER BY r.sequence)
+                    FROM reading r
+                    WHERE r.machine_id = s.machine_id AND r.characteristic_id = s.characteristic_id
+                        AND r.sequence > s.sequence - {FEWEST} AND r.code <> 'imported'
                 ) END, '[]'),
                 coalesce((
                     SELECT json_agg(json_build_array(json_build_array(w.machine_id, w.machine, f.id, f.key), f.form)

@@ -3,17 +3,19 @@
 import json
 import random
 from collections.abc import Iterator
-from datetime import UTC, datetime, timedelta
+from datetime import UTC, datetime, timedelta, timezone
 from typing import Any
 
 import pytest
 from anyio.from_thread import BlockingPortal, start_blocking_portal
 
+from app.core.clock import FEWEST
 from app.loop.readings.door import Directory
 from app.loop.readings.schemas import decode_one
 from app.loop.readings.writer.connection import connect
+from app.loop.readings.writer.load import load
 from app.loop.readings.writer.snapshot import Snapshot
-from app.loop.readings.writer.transaction import transact
+from app.loop.readings.writer.transaction import ROLLBACK, transact
 from tests.conftest import Server
 from tests.loop.readings.record import history, must_hold
 from tests.shop import Shop
@@ -129,6 +131,31 @@ def test_readings_are_decided_from_memory_as_if_all_were_loaded(
         assert len(loaded) > 20
     assert any(row["outstanding"] for row in history(dsn, twins[0].names[0]))
     must_hold(dsn)
+
+
+def test_what_is_kept_of_a_stream_is_what_would_be_loaded(forgetful: Forgetful) -> None:
+    """With its times of arrival: measured later and earlier, in another zone, and without a time."""
+    kept, now = Snapshot(), datetime.now(UTC)
+    zone = timezone(timedelta(hours=5, minutes=30))
+    tells = [
+        {"measured_at": (now - timedelta(minutes=20)).isoformat()},
+        {"measured_at": (now - timedelta(minutes=30)).astimezone(zone).isoformat()},
+        {"machined_at": (now - timedelta(minutes=40)).astimezone(zone).isoformat()},
+        {},
+    ]
+    forgetful.shop.add(f"{forgetful.names[0]}-m", mode="measure_only", average_memory=0)
+    names = [forgetful.names[0], f"{forgetful.names[0]}-m"]
+    for size, told in zip((0, 1, 8, 2, 1, 0, 1), [*tells, *tells[:3]], strict=True):
+        for name in names:
+            entry = forgetful.directory.look_up(name)
+            body = {"characteristic": name, "measured": 40 + size / 1000, **told}
+            wanted = [(entry, decode_one(json.dumps(body).encode(), datetime.now(UTC)))]
+            forgetful.portal.call(transact, forgetful.pipeline, {}, kept, wanted)
+            fresh = Snapshot()
+            forgetful.portal.call(load, forgetful.pipeline, {}, fresh, wanted)
+            forgetful.portal.call(forgetful.pipeline.run, ROLLBACK)
+            assert kept.streams[entry.characteristic_id] == fresh.streams[entry.characteristic_id]
+    assert len(kept.streams[forgetful.directory.look_up(names[0]).characteristic_id].arrivals) == FEWEST
 
 
 def numbers(twin: Twin) -> int:

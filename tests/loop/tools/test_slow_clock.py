@@ -1,0 +1,223 @@
+"""A clock that is behind, as the writer decides reading after reading: the tool is paused before parts are out, and for nothing else."""
+
+from datetime import UTC, datetime, timedelta
+from typing import Any
+
+import numpy as np
+import pytest
+from msgspec import structs
+
+from app.core.clock import FEWEST
+from app.core.parameters import Parameters
+from app.loop.readings.records import Entry
+from app.loop.readings.schemas import ReadingIn
+from app.loop.readings.writer.columnar import decide_in_columns
+from app.loop.readings.writer.decide import decide_one_by_one, decide_reading
+from app.loop.readings.writer.pending import PendingCorrection, PendingWrites, Verdict
+from app.loop.readings.writer.snapshot import LoadedAverage, LoadedStream, LoadedTool, Snapshot
+from tests.shop import PARAMETERS
+
+OUT = 8.0  # µm
+BOTH, CUT = ("machined_at", "measured_at"), ("machined_at",)
+TOOL, AVERAGE = (1, PARAMETERS["tool_memory"]), (1, PARAMETERS["average_memory"])
+HOURS = timedelta(hours=1)
+
+
+class Machine:
+    """A lathe that cuts a part a minute, and applies a correction before the next; wear 0.5 µm a part, scatter 0.3 µm.
+
+    tells: the times that it sends, by a clock that is behind. buffer: parts between cut and receipt. step: of the size.
+    gauge: how long before its receipt a part is measured.
+    """
+
+    def __init__(self, tells: tuple[str, ...], behind: timedelta = HOURS * 0, k: int = 2, seed: int = 0) -> None:
+        self.tells, self.behind, self.buffer, self.step, self.wear = tells, behind, 0, 0.0, 0.5
+        self.gauge = timedelta()
+        self.at, self.chance, self.offset = datetime(2026, 3, 2, 6, tzinfo=UTC), np.random.default_rng(seed), 0.0
+        self.sizes, self.cuts, self.actions, self.alarms = list[float](), list[datetime](), list[str](), list[Any]()
+        self.entry, self.snapshot = Entry(1, "lathe", 1, "seat"), Snapshot(last_correction={1: 0}, versions={1: 0})
+        self.snapshot.parameters[1] = Parameters(**PARAMETERS | {"weighting_factor": k})
+        self.snapshot.streams[1] = LoadedStream(entry=self.entry, version=1, average=AVERAGE[1], tool=TOOL[1])
+        self.snapshot.averages[AVERAGE] = LoadedAverage(*AVERAGE)
+        self.snapshot.tools[TOOL] = LoadedTool(machine_id=1, number=TOOL[1])
+
+    def part(self) -> None:
+        """Cut a part, and measure the one that comes out of the buffer."""
+        self.at += timedelta(minutes=1)
+        self.sizes.append(
+            self.wear * len(self.sizes) + self.step + self.offset * 1000 + float(self.chance.normal(0, 0.3))
+        )
+        self.cuts.append(self.at)
+        if len(self.sizes) > self.buffer:
+            place = len(self.sizes) - 1 - self.buffer
+            self.read(self.sizes[place], self.cuts[place])
+
+    def read(self, size: float, cut: datetime) -> None:
+        """Send a reading, and apply what is asked for before the next part."""
+        times = {"machined_at": cut, "measured_at": self.at - self.gauge}
+        verdict = self.decide(size, **{name: times[name] - self.behind for name in self.tells})
+        if verdict.correction is not None and verdict.correction.status == "pending":
+            self.apply(verdict.correction)
+
+    def decide(self, size: float, **told: Any) -> Verdict:
+        """Have a reading decided, as if it was stored."""
+        pending = PendingWrites(self.snapshot)
+        reading = ReadingIn("seat", measured=round(40 + size / 1000, 5), **told)
+        verdict = decide_reading(pending, self.entry, reading, self.at)
+        assert isinstance(verdict, Verdict)
+        for number, alarm in enumerate(pending.raised, 1):
+            alarm.id = number
+        self.alarms += [alarm for alarm in pending.raised if alarm.kind == "early_effect"]
+        pending.settle()
+        self.actions.append(verdict.decision.action.value)
+        return verdict
+
+    def apply(self, correction: PendingCorrection) -> None:
+        """Confirm it, some seconds later."""
+        self.offset = round(self.offset + correction.amount, 9)
+        tool = self.snapshot.tools[TOOL]
+        at = self.at + timedelta(seconds=5)
+        self.snapshot.tools[TOOL] = structs.replace(
+            tool,
+            offset=self.offset,
+            total=round(tool.total + correction.amount, 9),
+            corrections=[
+                c._replace(status="applied", applied_at=at) if c.number == correction.number else c
+                for c in tool.corrections
+            ],
+        )
+
+    @property
+    def out(self) -> int:
+        return sum(abs(size) > OUT for size in self.sizes)
+
+    def run(self, parts: int) -> None:
+        """Cut so many, or up to the one that the machine is to stop at."""
+        for _part in range(parts):
+            self.part()
+            if self.actions and self.actions[-1] == "stop":
+                break
+
+
+@pytest.mark.parametrize("k", [1, 2, 4])
+@pytest.mark.parametrize("hours", [0.5, 3])
+def test_a_clock_that_is_behind_costs_one_part(hours: float, k: int) -> None:
+    """Of 60 parts 20 to 30 would be out, of which nothing stops the machine. The alarm comes before, and the first that is out stops it."""
+    machines = [Machine(BOTH, HOURS * hours, k, seed) for seed in range(6)]
+    for machine in machines:
+        machine.run(60)
+        assert [alarm.data["by"] for alarm in machine.alarms] == ["clock"]
+        [alarm] = machine.alarms
+        assert alarm.sequence <= 11
+        assert machine.actions[-1] == "stop"
+        assert machine.out <= 2
+    assert sum(machine.out for machine in machines) <= len(machines) + 1
+
+
+def test_a_clock_that_is_set_back_while_the_machine_cuts_is_found() -> None:
+    """By an hour, as in autumn: all that it sends then is older than what it has sent."""
+    machine = Machine(BOTH)
+    machine.run(20)
+    assert (machine.alarms, machine.out) == ([], 0)
+    machine.behind = HOURS
+    machine.run(20)
+    [alarm] = machine.alarms
+    assert alarm.data["by"] == "clock"
+    assert alarm.sequence <= 32
+
+
+@pytest.mark.parametrize("scatter", [0.0, 20.0])
+def test_a_clock_that_is_right_to_some_seconds_pauses_nothing(scatter: float) -> None:
+    machine = Machine(BOTH)
+    for _part in range(100):
+        machine.behind = timedelta(seconds=abs(float(machine.chance.normal(0, scatter))))
+        machine.part()
+    assert (machine.alarms, machine.out) == ([], 0)
+
+
+@pytest.mark.parametrize("tells", [CUT, BOTH])
+@pytest.mark.parametrize("buffer", [4, 12, 25])
+def test_parts_that_are_on_the_way_at_an_even_pace_pause_nothing(tells: tuple[str, ...], buffer: int) -> None:
+    """Nor where an edge chips, and all that is in the buffer is out of tolerance."""
+    for seed in range(6):
+        machine = Machine(tells, k=1 + seed % 3, seed=seed)
+        machine.buffer, machine.wear = buffer, (0.05, 0.3)[seed % 2]
+        for part in range(90):
+            machine.step = 10.0 if part >= 50 else 0.0
+            machine.part()
+        assert machine.alarms == []
+        assert "stop" not in machine.actions
+
+
+def test_a_gauge_whose_every_reading_is_five_minutes_late_pauses_nothing() -> None:
+    """It writes when it began, or its file is fetched each five minutes. Parts are on the way for twenty."""
+    for seed in range(6):
+        machine = Machine(BOTH, k=1 + seed % 3, seed=seed)
+        machine.gauge, machine.buffer, machine.wear = timedelta(minutes=5), 20, (0.05, 0.3)[seed % 2]
+        for part in range(90):
+            machine.step = 10.0 if part >= 50 else 0.0
+            machine.part()
+        assert machine.alarms == []
+        assert "correct" in machine.actions
+        assert "stop" not in machine.actions
+
+
+def test_parts_on_the_way_are_that_while_a_tool_is_paused_for_another_reason() -> None:
+    """By `machined_at` a part was cut before a correction, and no clock is under suspicion: it is answered as ever."""
+    for late, answer in ((timedelta(minutes=5), "none"), (HOURS, "stop")):
+        machine = Machine(BOTH)
+        machine.gauge = late
+        for size in (0, 0, 0, 6, 6, 6):
+            machine.at += timedelta(minutes=1)
+            machine.read(size, machine.at - HOURS)
+            if machine.actions[-1] == "correct":
+                break
+        machine.snapshot.tools[TOOL] = structs.replace(machine.snapshot.tools[TOOL], paused_by=7)
+        machine.at += timedelta(minutes=1)
+        machine.read(OUT + 1, machine.at - HOURS)
+        assert machine.actions[-2:] == ["correct", answer]
+
+
+def test_quiet_readings_of_a_batch_are_among_those_that_came_in() -> None:
+    """Else those before and after them look as if they had followed each other."""
+    kept = []
+    for columns in (False, True):
+        machine = Machine(BOTH)
+        pending = PendingWrites(machine.snapshot)
+        quiet = [
+            (machine.entry, ReadingIn("seat", measured=40.0, measured_at=machine.at - timedelta(minutes=late)))
+            for late in (0, 3, 9, 4, 2, 7, 1)
+        ]
+        last = (machine.entry, ReadingIn("seat", measured=40.0, machined_at=machine.at - HOURS))
+        decide = decide_in_columns if columns else decide_one_by_one
+        decide(pending, [*quiet, last], machine.at)
+        kept.append(pending.stream(1).arrivals[-FEWEST:])
+    assert kept[0] == kept[1]
+    assert [each.sequence for each in kept[1]] == [4, 5, 6, 7, 8]
+
+
+@pytest.mark.parametrize("tells", [CUT, BOTH])
+def test_what_a_network_kept_back_pauses_nothing(tells: tuple[str, ...]) -> None:
+    """In a bunch, and one reading each half minute beside those of now."""
+    for apart in (0.2, 30.0):
+        machine = Machine(tells)
+        machine.run(10)
+        away = machine.at
+        machine.at += HOURS
+        for minute in range(30):
+            machine.at += timedelta(seconds=apart)
+            now, cut = machine.at, away + timedelta(minutes=2 * minute)
+            machine.at = max(cut, now)
+            machine.behind = machine.at - cut  # measured when it was cut
+            machine.read(0.5 * minute, machine.at)
+        assert machine.alarms == []
+
+
+def test_history_that_is_sent_as_readings_pauses_nothing() -> None:
+    """A part a minute, three hours ago, as fast as they can be sent."""
+    machine = Machine(BOTH)
+    for minute in range(60):
+        machine.at += timedelta(seconds=0.05)
+        machine.behind = HOURS * 3 - timedelta(minutes=minute)
+        machine.read(0.3 * minute, machine.at)
+    assert machine.alarms == []
