@@ -16,7 +16,7 @@ from tests.shop import Shop
     ("text", "reason"),
     [
         (
-            "Feature;Nominal;Upper;Lower;Actual\nA;10;0.1;-0.1;10.002\n",
+            "Feature;Nominal;Top;Bottom;Actual\nA;10;0.1;-0.1;10.002\n",
             "the upper limit (--map upper=COLUMN) is missing",
         ),
         ("Feature;Nominal;Upper tol;Lower tol;Actual\nA;10;;;10.002\n", "the upper limit is missing"),
