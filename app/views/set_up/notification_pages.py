@@ -17,7 +17,6 @@ from app.loop.alarms.kinds import kinds
 from app.loop.notifications import actions, browser_actions, queries
 from app.loop.notifications.calendar_queries import coming
 from app.loop.notifications.schemas import OwnAddressIn, OwnBrowserIn, ReceiverIn, RouteIn, shown_address
-from app.loop.notifications.tables import Receiver
 from app.loop.notifications.wording import (
     changes_word,
     delivery_word,
@@ -351,8 +350,8 @@ def _own(
     )
 
 
-def _beyond(row: Receiver | None) -> dict[str, Any] | None:
-    """All quiet hours in words, and absence, where the form does not hold them: more than one, not every day, or a date."""
+def _beyond(row: Any) -> dict[str, Any] | None:
+    """All quiet hours of a receiver in words, and absence, where the form does not hold them: more than one, not every day, or a date."""
     if row is None:
         return None
     held = len(row.quiet) <= 1 and all(set(each["days"]) == set(EVERY_DAY) for each in row.quiet)
