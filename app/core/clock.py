@@ -1,4 +1,4 @@
-"""A clock that is behind: what it tells lies as long before its receipt, reading after reading.
+"""A clock that is behind: what it states lies as long before its receipt, reading after reading.
 
 What a network kept back comes in a bunch, each reading less late than the one before; what a file holds lies as far back as it lies.
 A clock that is wrong is wrong by the same, whatever the pace of the machine. So does a buffer that each part goes through at an even pace:
@@ -14,8 +14,8 @@ EVEN = 60.0  # by how much two of them may differ: clocks that tell the minute
 SPAN = 4.0  # times that, and longer, they take to arrive: one by one
 
 
-def constant_lag(received: Sequence[float], told: Sequence[float]) -> float | None:
-    """By how much the newest readings all lie before their receipt; None unless by as much. told: by the clock in question.
+def constant_lag(received: Sequence[float], stated: Sequence[float]) -> float | None:
+    """By how much the newest readings all lie before their receipt; None unless by as much. stated: by the clock in question.
 
     >>> constant_lag([0, 60, 125, 180, 240], [-7200, -7141, -7075, -7021, -6960])
     7200
@@ -24,10 +24,10 @@ def constant_lag(received: Sequence[float], told: Sequence[float]) -> float | No
     >>> constant_lag([0, 1, 2, 3, 4], [-7200, -7140, -7075, -7020, -6960]) is None  # a bunch
     True
     """
-    received, told = received[-FEWEST:], told[-FEWEST:]
+    received, stated = received[-FEWEST:], stated[-FEWEST:]
     if len(received) < FEWEST:
         return None
-    lags = sorted(at - said for at, said in zip(received, told, strict=True))
+    lags = sorted(at - then for at, then in zip(received, stated, strict=True))
     uneven, took = lags[-1] - lags[0], max(received) - min(received)
     if lags[0] < LEAST or uneven > min(EVEN, took / SPAN) or took <= 0:
         return None

@@ -35,7 +35,7 @@ from app.loop.readings.writer.pending import (
     Stored,
     Verdict,
 )
-from app.loop.readings.writer.slow_clock import behind, lag_with, name_clock, told_by_time
+from app.loop.readings.writer.slow_clock import behind, lag_with, name_clock, time_decides
 from app.loop.readings.writer.snapshot import Arrival
 
 
@@ -100,7 +100,7 @@ def decide_reading(pending: PendingWrites, entry: Entry, reading: ReadingIn, now
     deviation = deviation_of(measured, parameters.target, empirical_value)
     course, jump = _course(stream, deviation, compensated)
     paused_by = stream.paused_by if tool is None or stream.paused_by is not None else tool.paused_by
-    timed = told_by_time(stream, reading, compensated, previous_tool=previous_tool)
+    timed = time_decides(stream, reading, compensated, previous_tool=previous_tool)
     lag = lag_with(stream, Arrival(sequence, now, measured_at), timed=timed)
     if lag is not None and paused_by is not None:  # a part that is out is not taken for one on the way
         previous_tool, outstanding, amounts = False, (), ()

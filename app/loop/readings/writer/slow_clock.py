@@ -19,7 +19,7 @@ from app.loop.readings.writer.snapshot import Arrival
 from app.loop.tables.tools import EARLY
 
 
-def told_by_time(stream: PendingStream, reading: ReadingIn, compensated: float | None, *, previous_tool: bool) -> bool:
+def time_decides(stream: PendingStream, reading: ReadingIn, compensated: float | None, *, previous_tool: bool) -> bool:
     """Tell if time alone says that the part was cut without applied corrections, or, as the tool was measured, before that was changed."""
     tool, of_tool = stream.tool, stream.parameters.rules.of_tool
     at = reading.machined_at or (reading.measured_at if of_tool else None)
@@ -35,21 +35,21 @@ def told_by_time(stream: PendingStream, reading: ReadingIn, compensated: float |
 def lag_with(stream: PendingStream, arrival: Arrival, *, timed: bool) -> float | None:
     """Keep when the reading that is decided now came in; by how much the newest say they were measured before that, s, if it matters.
 
-    timed: it does, by `told_by_time`.
+    timed: it does, by `time_decides`.
     """
     if stream.tool is not None:
         stream.arrivals.append(arrival)
     if not timed:
         return None
     newest = [each for each in stream.arrivals[-FEWEST:] if each.sequence > stream.start.gain_from]
-    received, told = ([getattr(each, name).timestamp() for each in newest] for name in ("received_at", "measured_at"))
-    return constant_lag(received, told)
+    received, stated = ([getattr(each, name).timestamp() for each in newest] for name in ("received_at", "measured_at"))
+    return constant_lag(received, stated)
 
 
 def behind(
     pending: PendingWrites, stream: PendingStream, decision: Decision, lag: float, *, previous_tool: bool
 ) -> PendingAlarm | None:
-    """Pause the tool if the clock is behind, of which alone it is known what the part was cut without (`told_by_time`); the alarm."""
+    """Pause the tool if the clock is behind, of which alone it is known what the part was cut without (`time_decides`); the alarm."""
     tool = stream.tool
     if tool is None or not (previous_tool or decision.amount is not None):
         return None
@@ -58,7 +58,7 @@ def behind(
 
 
 def name_clock(alarms: Sequence[PendingAlarm], reading: ReadingIn, now: datetime) -> None:
-    """Say in alarms about a deviation that time alone says what the part was cut without (`told_by_time`)."""
+    """Say in alarms about a deviation that time alone says what the part was cut without (`time_decides`)."""
     for alarm in alarms:
         if alarm.kind != ReadingAlarm.PROBE_FAULT.value and reading.machined_at is not None:
             alarm.data["lag"] = round((now - reading.machined_at).total_seconds(), 1)
