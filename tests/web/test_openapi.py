@@ -20,7 +20,7 @@ from app.loop.readings.api import BatchCounts
 from app.loop.readings.schemas import ReadingIn
 from app.web.api_docs import _kind, curl, prose
 from app.web.openapi import EXAMPLES, example_of, operations, resolve
-from tests.conftest import Server
+from tests.conftest import RunServer, Server
 from tests.in_process import application
 
 pytestmark = pytest.mark.own_server  # the examples name machines and characteristics
@@ -270,6 +270,11 @@ class TestExamples:
 
 @pytest.fixture(scope="module")
 def plant(server: Server, made: Json) -> Json:
+    """The server of this file, for tests that leave the things of the examples as they are."""
+    return planted(server, made)
+
+
+def planted(server: Server, made: Json) -> Json:
     """A server where the things stand that the document's examples name: lathe-1, shaft-d40, corrections, an alarm."""
     clients = {role: server.client(server.key(role)) for role in ROLES}
     engineer = clients["engineer"]
@@ -508,40 +513,34 @@ class TestAgainstTheServer:
         BatchCounts.model_validate(batch.json())
 
     @pytest.mark.parametrize("share", range(SHARES))
-    def test_the_examples_work_and_the_roles_are_true(
-        self, server: Server, plant: Json, made: Json, share: int
-    ) -> None:
-        """Every operation with the examples as they stand: refused by the role below its own, taken (or not found) with it."""
-        clients = {role: server.client(server.key(role)) for role in ROLES}  # others' keys are revoked by examples
-        clients["machine"] = server.client(server.key(machine="lathe-1"))
-        wrong = []
-        for method, path, operation in list(operations(made))[share::SHARES]:
-            if operation.get("security") == []:
-                continue
-            least = operation["x-role"]
-            below = ROLES[: ROLES.index(least)][-1:]
-            for role in (*below, least, "machine"):
-                may = operation["x-machine-key"] if role == "machine" else role == least
-                answer = send(clients[role], method, path, operation, number=999_999)
-                refused = answer.status_code in {401, 403}
-                too_few = answer.status_code == 422 and path.endswith(OF_MANY_READINGS)
-                if refused is may or (answer.status_code == 422 and not too_few) or answer.status_code >= 500:
-                    wrong.append(f"{role}: {method} {path} answered {answer.status_code}")
-        assert wrong == []
+    def test_the_examples_work_and_the_roles_are_true(self, run_server: RunServer, made: Json, share: int) -> None:
+        """Every operation with the examples as they stand: refused by the role below its own, taken (or not found) with it.
 
-    def test_what_is_answered_to_an_example_has_the_fields_of_the_example_of_an_answer(
-        self, plant: Json, made: Json
-    ) -> None:
-        answered = 0
-        for method, path, operation in operations(made):
-            if operation["operationId"] == "events" or operation.get("security") == []:
-                continue
-            answer = send(plant["clients"]["admin"], method, path, operation, number=999_999)
-            if answer.is_success and answer.headers.get("content-type") == "application/json":
-                described = resolve(made, operation["responses"][str(answer.status_code)])
-                assert answer.json().keys() == described["content"]["application/json"]["example"].keys(), path
-                answered += 1
-        assert answered > 40
+        What is answered has the fields of the example of an answer. Each share has a server of its own: the examples change it.
+        """
+        with run_server() as server:
+            planted(server, made)
+            clients = {role: server.client(server.key(role)) for role in ROLES}  # others' keys are revoked by examples
+            clients["machine"] = server.client(server.key(machine="lathe-1"))
+            wrong, as_described = [], 0
+            for method, path, operation in list(operations(made))[share::SHARES]:
+                if operation.get("security") == []:
+                    continue
+                least = operation["x-role"]
+                below = ROLES[: ROLES.index(least)][-1:]
+                for role in (*below, least, "machine"):
+                    may = operation["x-machine-key"] if role == "machine" else role == least
+                    answer = send(clients[role], method, path, operation, number=999_999)
+                    refused = answer.status_code in {401, 403}
+                    too_few = answer.status_code == 422 and path.endswith(OF_MANY_READINGS)
+                    if refused is may or (answer.status_code == 422 and not too_few) or answer.status_code >= 500:
+                        wrong.append(f"{role}: {method} {path} answered {answer.status_code}")
+                    if answer.is_success and answer.headers.get("content-type") == "application/json":
+                        described = resolve(made, operation["responses"][str(answer.status_code)])
+                        assert answer.json().keys() == described["content"]["application/json"]["example"].keys(), path
+                        as_described += 1
+        assert wrong == []
+        assert as_described > 40
 
     def test_errors_are_described_where_they_happen(self, server: Server, made: Json) -> None:
         anonymous = server.client()
