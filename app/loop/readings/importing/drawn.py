@@ -1,6 +1,8 @@
 """Characteristics that a table itself describes, row by row: nominal size and limits, by which missing ones are set up."""
 
 from collections.abc import Collection
+from enum import Enum
+from typing import NamedTuple
 
 from app.core.natural import NaturalLimit
 from app.core.number_text import NotANumber, read_number
@@ -20,9 +22,17 @@ class _Wrong(ValueError):
     """A characteristic that its rows do not describe; the words say why."""
 
 
+class _Limits(Enum):
+    """The meanings of limits: sizes, or deviations from the nominal size."""
+
+    SIZES = 1
+    DEVIATIONS = 2
+
+
 def contents(layout: Layout) -> list[Content]:
     """The characteristics that the rows name, as far as they describe them, in the order of `layout.names`."""
-    return [_content(place, name, drawn, layout) for place, (name, drawn) in enumerate(layout.drawn.items())]
+    votes = _votes(layout)
+    return [_content(place, name, drawn, layout, votes) for place, (name, drawn) in enumerate(layout.drawn.items())]
 
 
 def missing(layout: Layout, chosen: Collection[int]) -> tuple[list[Content], list[Content]]:
@@ -31,9 +41,62 @@ def missing(layout: Layout, chosen: Collection[int]) -> tuple[list[Content], lis
     return [each for each in others if not each.not_new], [each for each in others if each.not_new]
 
 
-def _content(place: int, name: str, drawn: Drawn, layout: Layout) -> Content:
+class _Vote(NamedTuple):
+    """The meaning of the limits of a line by its numbers. sure: they are far nearer to the one than to the other."""
+
+    limits: _Limits
+    sure: bool
+    line: int
+
+
+def _votes(layout: Layout) -> dict[_Limits, _Vote]:
+    """The meanings of columns such as Upper and Lower by the numbers of all lines, each with the first line that has it."""
+    votes: list[_Vote] = []
+    for name, drawn in layout.drawn.items():
+        try:
+            vote = _vote(drawn.line, *(_length(name, drawn, layout, side) for side in ("nominal", "lower", "upper")))
+        except _Wrong:
+            continue
+        votes += [] if vote is None else [vote]
+    sure = [vote for vote in votes if vote.sure] or votes
+    return {vote.limits: vote for vote in reversed(sure)}
+
+
+def _vote(line: int, nominal: float | None, lower: float | None, upper: float | None) -> _Vote | None:
+    """The only meaning that the limits of a line can have: sizes are about the nominal size, deviations about 0. None where both are possible."""
+    limits = [each for each in (lower, upper) if each is not None]
+    if not nominal or not limits:
+        return None
+    if all(abs(each) < abs(nominal) / 10 for each in limits):
+        return _Vote(_Limits.DEVIATIONS, True, line)
+    if all(abs(each - nominal) < abs(nominal) / 10 for each in limits) and any(each != nominal for each in limits):
+        return _Vote(_Limits.SIZES, True, line)
+    if lower is None or upper is None or (lower <= nominal <= upper) == (lower <= 0 <= upper):
+        return None
+    return _Vote(_Limits.SIZES if lower <= nominal <= upper else _Limits.DEVIATIONS, False, line)
+
+
+def _agreed(votes: dict[_Limits, _Vote], own: _Vote | None, column: str) -> _Limits:
+    """The meaning that all lines give a column such as Upper, and this one does not deny. Raises `_Wrong`."""
+    found = dict(votes)
+    if own is not None:
+        found.setdefault(own.limits, own)
+    if len(found) == 1:
+        return next(iter(found))
+    what = _("Name it “upper limit” or “lower limit” for sizes, “upper deviation” or “lower deviation” for deviations")
+    if not found:
+        words = _("its {column} may be a size or a deviation, and no other line tells. {what}")
+        raise _Wrong(words.format(column=column, what=what))
+    words = _(
+        "its {column} holds sizes by the numbers of line {sizes}, and deviations by those of line {deviations}. {what}"
+    )
+    sizes, deviations = found[_Limits.SIZES].line, found[_Limits.DEVIATIONS].line
+    raise _Wrong(words.format(column=column, sizes=sizes, deviations=deviations, what=what))
+
+
+def _content(place: int, name: str, drawn: Drawn, layout: Layout, votes: dict[_Limits, _Vote]) -> Content:
     try:
-        nominal, lower, upper = _limits(name, drawn, layout)
+        nominal, lower, upper = _limits(name, drawn, layout, votes)
         natural = _natural(drawn, layout)
     except _Wrong as error:
         return Content(place, "", "", "", name, "mm", not_new=str(error))
@@ -60,7 +123,9 @@ def _natural(drawn: Drawn, layout: Layout) -> NaturalLimit | None:
     return NaturalLimit(said)
 
 
-def _limits(name: str, drawn: Drawn, layout: Layout) -> tuple[float | None, float | None, float | None]:
+def _limits(
+    name: str, drawn: Drawn, layout: Layout, votes: dict[_Limits, _Vote]
+) -> tuple[float | None, float | None, float | None]:
     """Nominal size, lower and upper limit, mm. Raises `_Wrong`."""
     if drawn.other:
         words = _(
@@ -80,29 +145,38 @@ def _limits(name: str, drawn: Drawn, layout: Layout) -> tuple[float | None, floa
     if (both or is_unsigned(layout.named("lower"))) and lower is not None:
         lower = -abs(lower)
         upper = -lower if both else upper
+    own = _vote(drawn.line, nominal, lower, upper)
+    form_error = lower is None and not nominal  # its upper limit is both
     sizes = []
     for side, value in (("lower", lower), ("upper", upper)):
-        form_error = lower is None and not nominal  # its upper limit is both
-        column = folded(layout.named(side))
-        by_number = column in _EITHER and nominal and value is not None and abs(value) > abs(nominal) / 2
-        if value is None or form_error or column in _SIZES or by_number:
+        if value is None or form_error:
             sizes.append(value)
-        elif nominal is None and column in _EITHER:
-            words = _("its {column} may be a size or a deviation: the nominal size, which would tell, is missing")
-            raise _Wrong(words.format(column=layout.named(side)))
-        elif nominal is None:
-            raise _Wrong(
-                _("its {column} is a deviation from a nominal size, which is missing").format(column=layout.named(side))
-            )
-        else:
-            sizes.append(round(nominal + value, 9))
+            continue
+        found = _kind(layout.named(side), nominal, votes, own)
+        sizes.append(value if found is _Limits.SIZES else round((nominal or 0.0) + value, 9))
     if lower is not None and upper is not None and lower > 0 and sizes[0] != lower:
         words = _("its {column} is above 0: a deviation, or one without its sign? Nobody can tell")
         raise _Wrong(words.format(column=layout.named("lower")))
-    if nominal and upper is not None and sizes[1] == upper and abs(upper) < abs(nominal) / 2:
-        words = _("its {column} is a size by its name, and far from the nominal size: a deviation? Nobody can tell")
-        raise _Wrong(words.format(column=layout.named("upper")))
     return nominal, sizes[0], sizes[1]
+
+
+def _kind(column: str, nominal: float | None, votes: dict[_Limits, _Vote], own: _Vote | None) -> _Limits:
+    """The meaning of a column of limits, by its name or by the numbers. Raises `_Wrong` where they contradict each other."""
+    either, sizes = folded(column) in _EITHER, folded(column) in _SIZES
+    if nominal is None and not sizes:
+        words = _("its {column} is a deviation from a nominal size, which is missing")
+        if either:
+            words = _("its {column} may be a size or a deviation: the nominal size, which would tell, is missing")
+        raise _Wrong(words.format(column=column))
+    if either and nominal:
+        return _agreed(votes, own, column)
+    found = _Limits.SIZES if sizes else _Limits.DEVIATIONS
+    if own is not None and own.limits is not found:
+        words = _("its {column} is a deviation by its name, and near the nominal size: a size? Nobody can tell")
+        if sizes:
+            words = _("its {column} is a size by its name, and far from the nominal size: a deviation? Nobody can tell")
+        raise _Wrong(words.format(column=column))
+    return found
 
 
 def _length(name: str, drawn: Drawn, layout: Layout, field: str) -> float | None:

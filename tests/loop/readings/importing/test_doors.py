@@ -687,13 +687,22 @@ def test_of_such_a_table_what_is_missing_is_set_up_with_its_limits(plant: Plant,
         ("Feature;Meas;Nominal;Toleranz [µm]", "A;16.001;16;+/-10", (16.0, 15.99, 16.01)),
         ("Feature;Meas;Nominal;Tol", "A;16.001;16;0.010", "its Tol '0.010' may be half the tolerance or all of it"),
         ("Feature;Meas;Nominal;Tol", "A;16.001;16;H7", "its Tol 'H7' may be"),
+        ("Feature;Meas;Nominal;Upper;Lower", "A;0.5;0.5;0.4;-0.4", (0.5, 0.1, 0.9)),
+        ("Feature;Meas;Nominal;Upper;Lower", "A;0.2;0.2;0.3;0.1", (0.2, 0.1, 0.3)),
+        ("Feature;Meas;Nominal;Upper;Lower", "A;0.2;0.2;0.3;-0.3", "may be a size or a deviation, and no other line"),
+        ("Feature;Meas;Nominal;Upper;Lower", "A;0.2;0.2;0.3;-0.3\nB;16;16;0.1;0", (0.2, -0.1, 0.5)),
+        ("Feature;Meas;Nominal;Upper;Lower", "A;0.2;0.2;0.3;0\nB;16;16;16.1;16", (0.2, 0.0, 0.3)),
+        ("Feature;Meas;Nominal;Upper;Lower", "A;0.1;0.1;0.2;0.05\nB;16;16;0.1;0", "sizes by the numbers of line 2"),
+        ("Feature;Meas;Nominal;Upper;Lower", "A;20;20;0.2;0\nB;16;16;16.1;15.9", "sizes by the numbers of line 3"),
+        ("Feature;Meas;Nominal;Upper Tol;Lower Tol", "A;-25;-25;-24.9;-25.1", "near the nominal size: a size?"),
+        ("Feature;Meas;Nominal;USL;LSL", "A;0.5;0.5;0.4;-0.4", "far from the nominal size: a deviation?"),
     ],
 )
 def test_the_limits_of_a_row(tmp_path: Path, head: str, row: str, found: tuple[float | None, ...] | str) -> None:
     path = tmp_path / "a.csv"
     path.write_text(f"{head}\n{row}\n")
     named = {} if "Name;" not in head else {"characteristic": "Name"}
-    [content] = drawn.contents(look(path, Wishes(mapping=named)))
+    content, *_others = drawn.contents(look(path, Wishes(mapping=named)))
     if isinstance(found, str):
         assert found in content.not_new
     else:
@@ -805,6 +814,29 @@ def test_of_such_a_table_one_characteristic_gets_its_own_rows_or_a_question(plan
     columns = {"characteristic": "id", "measured": "actual", "part": "partnb"}
     readings, faults, _words = bridged(path, {name: name.lower() for name in PARTS}, columns=columns)
     assert (len(readings), faults) == (9, [])
+
+
+def test_of_a_name_and_a_value_a_row_each_is_of_the_characteristic_it_names(plant: Plant, tmp_path: Path) -> None:
+    path, key = tmp_path / "two.csv", plant.shop.another("bore", **D40)
+    text = "Name;Value\nBore;40.001\nShaft;40.002\n"
+    path.write_text(text)
+    answer = plant.table(path, text, characteristic=key)
+    for ask in (plant.command(path, characteristic=key), plant.page(path, key), str(answer)):
+        assert "2 characteristics (Bore, Shaft)" in ask
+        assert "--map characteristic=" in ask
+    data = {"csrf": plant.engineer.csrf(), "characteristic": key}
+    preview = plant.engineer.browser.post("/import", data=data, files={"file": ("two.csv", text)}).text
+    assert 'name="column_characteristic"' in preview, "it can be said on the page too"
+    assert plant.stored(key) == []
+    path.write_text(text.replace("Bore", key))
+    assert plant.command(path, characteristic=key) == ""
+    assert [size for size, _at in plant.stored(key)] == [40.001], "its own row only"
+    other = plant.shop.another("serial", **D40)
+    path.write_text(text)
+    assert plant.page(path, other, column_characteristic="", column_part="1", column_measured="2") == ""
+    assert [size for size, _at in plant.stored(other)] == [40.001, 40.002], "where the names are those of parts"
+    path.write_text("ID;Value\n1;40.001\n2;40.002\n")
+    assert look(path, Wishes()).names == (), "a number of a row is no name"
 
 
 def described(*lines: str) -> list[str]:
