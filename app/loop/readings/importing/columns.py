@@ -23,7 +23,7 @@ NAMED = ("id", *map(key_of, (
     "name", "dimension", "dimension name", "bezeichnung", "benennung", "naziv", "oznaka", "ime", "назив", "ознака", "наименование",
     "название", "обозначение",
 )))  # fmt: skip
-"""Columns that name a characteristic beside its nominal size or limits; elsewhere they may name a person."""
+"""Columns that name a characteristic beside its nominal size or limits; all but the first, a number of a row, without a time too."""
 AXES = frozenset({"axis", "ax", "achse", "osa", "os", "оса", "ось"})
 TIMES = frozenset(map(key_of, (
     "time", "zeit", "uhrzeit", "vreme", "cas", "време", "время", "vrijeme", "heure", "ora", "hora", "godzina", "czas", "idő", "időpont",
@@ -153,8 +153,10 @@ def guesses_of(header: tuple[str, ...]) -> dict[str, tuple[int, ...]]:
     beside = next((at for at, each in enumerate(names) if each in AXES), None)
     if "characteristic" in guesses and beside is not None:
         guesses["characteristic"] += (beside,)  # a feature has several: X, Y, D
-    elif "characteristic" not in guesses and "measured" in guesses and {"nominal", "upper", "lower"} & guesses.keys():
-        named = next((names.index(each) for each in NAMED if each in names), beside)
+    elif "characteristic" not in guesses and "measured" in guesses:
+        drawn = {"nominal", "upper", "lower"} & guesses.keys()
+        naming = NAMED if drawn else () if "measured_at" in guesses else NAMED[1:]  # beside a time it may be a person
+        named = next((names.index(each) for each in naming if each in names), beside if drawn else None)
         guesses |= {} if named is None else {"characteristic": (named,)}
     if set(COLUMNS) <= set(header):
         guesses |= {name: (header.index(name),) for name in (*ORIGIN, *VERDICT) if name in header}

@@ -134,7 +134,7 @@ class Layout:
             self.named("characteristic"),
             _(
                 "The rows are of {count} characteristics ({names}), and none is called {key}. Say which is which, a "
-                "characteristic for each, in place of the one."
+                "characteristic for each, in place of the one; or that this column names none (--map characteristic=)."
             ).format(count=len(self.names), names=", ".join(self.names[:10]), key=repr(key)),
         )
 

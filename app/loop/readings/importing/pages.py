@@ -161,7 +161,8 @@ def _preview(
     trouble: InbandError | None = None
     try:
         looked = look_apart(upload.path, _wishes(said), upload.name)
-        layout = looked.layout.of_one(characteristic, current.characteristic.name)
+        layout = looked.layout
+        layout = layout.of_one(characteristic, current.characteristic.name)
         looked = looked._replace(layout=layout)
         preview_result = preview(_database(request), characteristic, upload.path, looked)
         trouble = preview_result.trouble
