@@ -75,7 +75,44 @@ def _kinds(annotation: Any) -> set[Any]:
     return {origin or annotation}
 
 
-def by_field(error: InbandError, at: Callable[[str, str], tuple[str, str]] = lambda *same: same) -> dict[str, str]:
+class FieldErrors(dict[str, str]):
+    """Sentences by the name of the field in the form, which knows which of them a template has not asked for.
+
+    >>> errors = FieldErrors(name="Is missing.", key="Is taken.")
+    >>> errors.get("name"), errors.unsaid
+    ('Is missing.', ['key: Is taken.'])
+    """
+
+    def __init__(self, *of: Mapping[str, str], **named: str) -> None:
+        super().__init__(*of, **named)
+        self._asked: set[str] = set()
+
+    def __getitem__(self, name: str) -> str:
+        self._asked.add(name)
+        return super().__getitem__(name)
+
+    def get(self, name: str, default: Any = None) -> Any:
+        """The sentence of this field."""
+        self._asked.add(name)
+        return super().get(name, default)
+
+    def items(self) -> Any:
+        """All of them, which are asked for with that."""
+        self._asked.update(self)
+        return super().items()
+
+    def values(self) -> Any:
+        """All of them, which are asked for with that."""
+        self._asked.update(self)
+        return super().values()
+
+    @property
+    def unsaid(self) -> list[str]:
+        """Sentences that no field shows."""
+        return [f"{name}: {sentence}" for name, sentence in super().items() if name not in self._asked]
+
+
+def by_field(error: InbandError, at: Callable[[str, str], tuple[str, str]] = lambda *same: same) -> FieldErrors:
     """Errors by the name of the field in the form, each sentence once.
 
     at: from a field of the API and its message, the field of the form and the message there.
@@ -86,7 +123,7 @@ def by_field(error: InbandError, at: Callable[[str, str], tuple[str, str]] = lam
         sentence = words[:1].upper() + words[1:]
         if sentence not in messages.get(name, ""):
             messages[name] = f"{messages[name]}. {sentence}" if name in messages else sentence
-    return messages
+    return FieldErrors(messages)
 
 
 def length(text: str | None) -> float | str | None:

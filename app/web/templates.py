@@ -26,6 +26,7 @@ from app.language import i18n, numbers, short, times
 from app.web import cards, states, theme, usual_periods
 from app.web.assets import Assets
 from app.web.doors import door_of, machine_of, search_words, way_to
+from app.web.forms import FieldErrors, by_field
 from app.web.help_ways import help_of
 from app.web.page_queries import kept_period, said_period
 from app.web.paging import address
@@ -164,6 +165,8 @@ def render(request: Request, template: str | Template, **context: Any) -> str:
                     "chosen_theme": chosen_theme(request),
                     "person": getattr(state, "person", None),
                     "csrf": getattr(state, "csrf", ""),
+                    "refusal": None,
+                    "errors": FieldErrors(),
                     "newest_event": getattr(state, "newest_event", None),
                     "to_do": None,
                     "chosen_machine": None,
@@ -183,21 +186,29 @@ def page(
     request: Request,
     template: str | Template,
     *,
+    refusal: InbandError | None = None,
     status: int = HTTPStatus.OK,
     headers: dict[str, str] | None = None,
     **context: Any,
 ) -> HTMLResponse:
     """A whole page, or the part of one, as an answer. Pages show the state of now, so nobody keeps them.
 
+    refusal: why the form that was sent is shown again, with its status. Templates find the sentences of its fields in `errors`;
+    what none of them shows is said at the top by the frame of all pages.
     With a status of 400 and more nothing that the request has written is kept.
     """
+    errors = context.get("errors")
+    if errors is None:
+        errors = by_field(refusal) if refusal else {}
+    context |= {"refusal": refusal, "errors": errors if isinstance(errors, FieldErrors) else FieldErrors(errors)}
+    status = refusal.status if refusal else status
     headers = dict(headers or {})
     if status >= HTTPStatus.BAD_REQUEST:
         request.state.refused = True
-        for refusal in context.values():
-            if isinstance(refusal, InbandError):
-                note_reason(request.scope, refusal)
-                headers |= refusal.headers  # when to try again
+        for reason in context.values():
+            if isinstance(reason, InbandError):
+                note_reason(request.scope, reason)
+                headers |= reason.headers  # when to try again
     else:
         named = request.query_params.get("machine")
         context = {"chosen_machine": machine_of(request.url.path, named), **context}

@@ -17,7 +17,7 @@ from app.errors import Conflict, InbandError, Invalid, NotFound
 from app.language.i18n import _
 from app.web.api import problems
 from app.web.deps import FormDep
-from app.web.forms import by_field, typed
+from app.web.forms import typed
 from app.web.templates import page
 
 
@@ -188,8 +188,7 @@ def ask(
     **context: Any,
 ) -> Response:
     """The page of a question. form, error: what was sent, and why it is refused."""
-    asked: dict[str, Any] = {"question": question, "form": form or {}, "errors": by_field(error) if error else {}}
-    return page(request, template, status=error.status if error else 200, **asked, **context)
+    return page(request, template, refusal=error, question=question, form=form or {}, **context)
 
 
 def draw_question(

@@ -116,14 +116,13 @@ def _new(
     return page(
         request,
         "alignment/new.html",
-        status=error.status if error else 200,
+        refusal=error,
         form=form,
         kind=form.get("kind") if form.get("kind") in form_reader.KINDS else "points",
         found=form_reader.found_by(form),
         rows=form_reader.rows_of(form),
         most=form_reader.MOST_ROWS,
         errors=form_reader.at_fields(error, lines or []) if error else {},
-        error=error,
         machines=machines.machines(session),
         names=sorted({set_up.newest.name or "" for set_up in queries.set_ups(session)}),
         wording=wording,
@@ -178,11 +177,10 @@ def _pallet(request: Request, session: Session, form: Mapping[str, str], error: 
     return page(
         request,
         "alignment/pallet.html",
-        status=error.status if error else 200,
+        refusal=error,
         form=form,
         choices=choices,
         errors=form_reader.at_fields(error, []) if error else {},
-        error=error,
     )
 
 

@@ -156,10 +156,9 @@ def _new(request: Request, session: Session, form: Mapping[str, Any], error: Inb
     return page(
         request,
         "geometric_form/new.html",
-        status=error.status if error else 200,
+        refusal=error,
         form=form,
         errors=by_field(error, _shown_at) if error else {},
-        error=error,
         shown=FIELDS,
         machines=machines(session),
         kinds=wording.kinds(),

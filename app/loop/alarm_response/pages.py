@@ -19,7 +19,6 @@ from app.loop.machines import queries as machines
 from app.loop.maintenance.queries import running
 from app.web.deps import FormDep, Number, SessionDep, Sought, Word
 from app.web.fields import Reason
-from app.web.forms import by_field
 from app.web.limits import takes
 from app.web.paging import address, part_of
 from app.web.pictures import AS_FORM, FilesDep, pictures_of, sent
@@ -115,14 +114,13 @@ def _alarm(
     return page(
         request,
         "alarms/alarm.html",
-        status=error.status if error else 200,
+        refusal=error,
         row=row,
         photos=photo_queries.photos(session, row.alarm),
         most_photos=photo_actions.MOST_PHOTOS,
         action=confirmed_action,
         machine=machine,
         form=form or {},
-        errors=by_field(error) if error else {},
         wording=wording,
         outcomes=outcomes,
         reactions=Reactions(session),

@@ -17,7 +17,7 @@ from app.loop.control_plan import actions, queries, wording
 from app.loop.control_plan.schemas import ControlPlanIn
 from app.loop.readings.wording import field_word
 from app.web.deps import Before, FormDep, SessionDep, Word
-from app.web.forms import by_field, typed
+from app.web.forms import typed
 from app.web.paging import address, part_of
 from app.web.templates import page
 
@@ -65,7 +65,7 @@ def _page(
     return page(
         request,
         "control_plan/control_plan.html",
-        status=error.status if error else 200,
+        refusal=error,
         characteristic=current.characteristic,
         machine=current.machine,
         row=row,
@@ -76,7 +76,6 @@ def _page(
         lately=queries.missed_lately(session, current.characteristic, datetime.now(UTC)),
         part=part_of(rows, ON_PAGE, before, lambda each: each.missed.id, link),
         form=form if form is not None else _as_typed(plan),
-        errors=by_field(error) if error else {},
         may_plan=caller.may("engineer"),
         done=done,
         words=wording,

@@ -18,7 +18,7 @@ from app.loop.maintenance.queries import MaintenanceRow
 from app.loop.maintenance.schemas import ExtendIn, MaintenanceIn
 from app.loop.maintenance.verbs import END, OfMaintenance
 from app.web.deps import Before, FormDep, Number, SessionDep, Word
-from app.web.forms import by_field, typed
+from app.web.forms import typed
 from app.web.paging import address, part_of
 from app.web.templates import page
 from app.web.verb import Outcome, Verb, draw_question, said
@@ -79,10 +79,8 @@ def _form(
     return page(
         request,
         "maintenance/new.html",
-        status=error.status if error else 200,
+        refusal=error,
         form=form,
-        errors=by_field(error) if error else {},
-        problem=error if error and not error.errors else None,
         choices=[("", _("choose …")), *known, *([(ALL, _("All machines"))] if caller.may("engineer") else [])],
         usual=actions.USUAL,
         longest=actions.OF_OPERATOR,
@@ -129,11 +127,9 @@ def _extend_form(
     return page(
         request,
         "maintenance/extend.html",
-        status=error.status if error else 200,
+        refusal=error,
         row=row,
         form=form,
-        errors=by_field(error) if error else {},
-        problem=error if error and not error.errors else None,
     )
 
 

@@ -18,7 +18,7 @@ from app.loop.notes import actions, queries
 from app.loop.notes.schemas import NoteIn
 from app.web.deps import Before, FormDep, Number, SessionDep, Sought, Word
 from app.web.fields import LARGEST_ID, Reason
-from app.web.forms import by_field, typed
+from app.web.forms import typed
 from app.web.paging import address, part_of
 from app.web.templates import page
 from app.web.validation import checked
@@ -83,12 +83,11 @@ def _form(request: Request, session: Session, form: Mapping[str, str], error: In
     return page(
         request,
         "notes/new.html",
-        status=error.status if error else 200,
+        refusal=error,
         machine=machine,
         characteristic=current.characteristic if current else None,
         reading=reading,
         form=form,
-        errors=by_field(error) if error else {},
     )
 
 
@@ -122,13 +121,12 @@ def _note(
     return page(
         request,
         "notes/note.html",
-        status=error.status if error else 200,
+        refusal=error,
         row=row,
         note=row.note,
         may_withdraw=queries.may_withdraw(row.note, caller),
         late=late,
         typed=typed,
-        errors=by_field(error) if error else {},
     )
 
 

@@ -19,7 +19,7 @@ from app.loop.quarantine.queries import State
 from app.loop.quarantine.schemas import DoubtIn, SetAsideIn
 from app.loop.quarantine.verbs import OfPart
 from app.web.deps import Before, FormDep, Number, SessionDep, Word
-from app.web.forms import by_field, typed
+from app.web.forms import typed
 from app.web.paging import address, part_of
 from app.web.templates import page
 from app.web.verb import Outcome, Verb, draw_question, said
@@ -55,13 +55,11 @@ def _affected(
     return page(
         request,
         "quarantine/affected.html",
-        status=error.status if error else 200,
+        refusal=error,
         found=found,
         made=queries.quarantine(session, made.id) if made else None,
         guard=form.get("guard", ""),
         form=form,
-        errors=by_field(error) if error else {},
-        refused=error if isinstance(error, Conflict) else None,
         wording=alarm_words,
         words=wording,
     )

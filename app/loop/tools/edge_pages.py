@@ -76,7 +76,7 @@ def _tool(
     return page(
         request,
         "tools/tool.html",
-        status=error.status if error else 200,
+        refusal=error,
         machine=machine_row,
         row=row,
         known=known,

@@ -18,7 +18,6 @@ from app.loop.tables.tools import OPEN
 from app.loop.tools import gain_queries, queries, verbs, wording
 from app.loop.tools.verbs import OfAverage, OfCorrection, OfTool
 from app.web.deps import FormDep, Number, SessionDep, Word
-from app.web.forms import by_field
 from app.web.paging import address, part_of
 from app.web.templates import page
 from app.web.verb import Outcome, carry_out, draw_question, named
@@ -116,7 +115,7 @@ def _correction(
     return page(
         request,
         "tools/correction.html",
-        status=error.status if error else 200,
+        refusal=error,
         machine=on.machine,
         row=row,
         back=LISTS.get(came_from or "") or memory_address(machine, tool=row.correction.tool_memory),
@@ -124,7 +123,6 @@ def _correction(
         if chosen and caller.may("operator")
         else None,
         form=form or {},
-        errors=by_field(error) if error else {},
         wording=wording,
         address=memory_address,
         offered=verbs.offered,

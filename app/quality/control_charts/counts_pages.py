@@ -49,7 +49,7 @@ def count_chart_page(
     size: Annotated[str, Query(max_length=20)] = "",
 ) -> Response:
     """Show the form, and the chart of what was typed."""
-    shown: dict[str, Any] = {"found": None, "problem": None, "figure": None}
+    shown: dict[str, Any] = {"found": None, "refusal": None, "figure": None}
     if data.strip():
         try:
             counts, inspected = typed(data, size)
@@ -59,11 +59,10 @@ def count_chart_page(
                 asked["inspected"] = _listed(inspected if isinstance(inspected, list) else [inspected])
             shown["figure"] = f"/api/v1/figures/count-chart?{urlencode(asked)}"
         except Invalid as invalid:
-            shown["problem"] = invalid
+            shown["refusal"] = invalid
     return page(
         request,
         "control_charts/counts.html",
-        status=422 if shown["problem"] else 200,
         chart=chart,
         charts=[(each.value, wording.name(each)) for each in CountChart],
         data=data,

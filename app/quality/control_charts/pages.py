@@ -184,7 +184,7 @@ def _control(
     return page(
         request,
         "control_charts/control.html",
-        status=error.status if error else 200,
+        refusal=error,
         shown=ControlPage(session, current, choice, kind, judge),
         machine=current.machine,
         characteristic=current.characteristic,
@@ -199,7 +199,6 @@ def _control(
         remembering=[kind for kind in charts.REMEMBERING if judge is not None and kind in charts.kinds(judge)],
         link=link,
         figure=figure,
-        problem=error,
         wording=wording,
         said=statistics_wording,
         rule_name=lambda name, kind: rules_wording.name_of(RuleName(name), kind),
@@ -252,7 +251,7 @@ def _freeze(
     return page(
         request,
         "control_charts/freeze.html",
-        status=error.status if error else 200,
+        refusal=error,
         machine=current.machine,
         characteristic=current.characteristic,
         choice=choice,
@@ -263,7 +262,6 @@ def _freeze(
         fields=form_reader.FIELDS,
         limits_said=any(name.startswith("limits.") and text for name, text in typed.items()),
         errors=form_reader.at_fields(error) if error else {},
-        problem=error,
         quantities=list(Quantity),
         figure=f"/api/v1/characteristics/{key}/figures/baseline?{urlencode(_pictured(typed, choice))}",
         link=lambda last: f"/characteristics/{key}/control/freeze?{urlencode({**form, 'last': last})}",

@@ -40,7 +40,7 @@ from app.quality.control_charts.tables import Baseline
 from app.quality.proof import queries as proof
 from app.quality.proof import wording as proof_wording
 from app.web.deps import FormDep, SessionDep
-from app.web.forms import by_field, parsed
+from app.web.forms import parsed
 from app.web.templates import page
 
 router = APIRouter(include_in_schema=False)
@@ -165,7 +165,7 @@ def _rules(
     return page(
         request,
         "control_charts/rules.html",
-        status=error.status if error else 200,
+        refusal=error,
         characteristic=current.characteristic,
         machine=current.machine,
         watched=watched,
@@ -177,8 +177,6 @@ def _rules(
         last=last,
         link=link,
         form=form or {},
-        problem=error,
-        errors=by_field(error) if error else {},
         size=(WIDTH, HEIGHT),
         place=Place,
         do=Do,

@@ -23,7 +23,7 @@ from app.quality.control_charts.signals_wording import Cause
 from app.quality.proof import queries as proof
 from app.quality.proof import wording as proof_wording
 from app.web.deps import Before, FormDep, SessionDep
-from app.web.forms import by_field, parsed
+from app.web.forms import parsed
 from app.web.paging import address, part_of
 from app.web.templates import page
 
@@ -92,7 +92,7 @@ def _signal(
     return page(
         request,
         "control_charts/signal.html",
-        status=error.status if error else 200,
+        refusal=error,
         row=row,
         data=data,
         chart=Chart(row.signal.chart),
@@ -100,7 +100,6 @@ def _signal(
         figure=f"/api/v1/characteristics/{row.characteristic.key}/figures/control?{urlencode(query)}",
         causes=[("", _("Choose what it was")), *((cause.value, words.cause(cause)) for cause in Cause)],
         form=form or {},
-        errors=by_field(error) if error else {},
         words=words,
         rules=rules_wording,
         said=statistics,

@@ -25,7 +25,6 @@ from app.quality.proof import queries as proof
 from app.quality.proof import wording as proof_wording
 from app.web import forms
 from app.web.deps import Before, FormDep, SessionDep, Sought
-from app.web.forms import by_field
 from app.web.paging import address, part_of
 from app.web.templates import page
 
@@ -205,12 +204,10 @@ def _form(
     return page(
         request,
         "gauge_studies/form.html",
-        status=error.status if error else 200,
+        refusal=error,
         kind=kind,
         typed=begun,
         grid=grid or form_reader.shape(kind, {}),
-        errors=by_field(error) if error else {},
-        problem=error,
         study=study,
         machines=[(machine.key, machine.name) for machine in machines.machines(session, limit=100_000)],
         characteristics=[("", _("none"))]

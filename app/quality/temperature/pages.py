@@ -16,7 +16,7 @@ from app.loop.expansion.actions import ExpansionIn, set_expansion
 from app.loop.expansion.queries import row_of
 from app.quality.temperature import queries, wording
 from app.web.deps import FormDep, SessionDep, Word
-from app.web.forms import by_field, typed
+from app.web.forms import typed
 from app.web.templates import page
 
 router = APIRouter(include_in_schema=False)
@@ -60,14 +60,13 @@ def _page(
     return page(
         request,
         "temperature/temperature.html",
-        status=error.status if error else 200,
+        refusal=error,
         characteristic=current.characteristic,
         study=study,
         drift=drift,
         slope=drift.regression.effects.get(Column.TEMPERATURE.value) if drift else None,
         row=row_of(session, current.machine.id, current.characteristic.id),
         form=form if form is not None else _as_typed(study.expansion),
-        errors=by_field(error) if error else {},
         may_state=caller.may("engineer"),
         done=done,
         words=wording,

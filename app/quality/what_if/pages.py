@@ -235,7 +235,7 @@ def _proposal(
     return page(
         request,
         "what_if/proposal.html",
-        status=error.status if error else 200,
+        refusal=error,
         row=row,
         proposal=row.proposal,
         evidence=evidence,
@@ -246,8 +246,6 @@ def _proposal(
         replay_again=form_reader.again(row.characteristic.key, row.proposal.changes, evidence),
         done=wording.done(done) if done else None,
         typed=typed or {},
-        errors=by_field(error) if error else {},
-        problem=error,
         may_decide=caller.may("engineer"),
         may_withdraw=caller.may("operator") and row.proposal.proposed_by == caller.name,
         wording=wording,

@@ -52,7 +52,6 @@ from app.views.characteristic.wording import code_word, next_action, reading_lin
 from app.web.choice import Choice, ChosenOnPage
 from app.web.deps import Before, FormDep, SessionDep
 from app.web.fields import LARGEST_ID, Reason
-from app.web.forms import by_field
 from app.web.paging import part_of
 from app.web.templates import page
 from app.web.validation import checked
@@ -259,7 +258,7 @@ def send_measured_by_hand(
         if error.status == 404:
             raise
         session.expire_all()
-        return _reading(request, session, caller, current, sequence, status=error.status, typed=form, problem=error)
+        return _reading(request, session, caller, current, sequence, typed=form, refusal=error)
     return RedirectResponse(reading_link(characteristic, sequence), 303)
 
 
@@ -277,7 +276,7 @@ def send_exclusion(
         if error.status == 404:
             raise
         session.expire_all()
-        return _reading(request, session, caller, current, sequence, status=error.status, typed=form, problem=error)
+        return _reading(request, session, caller, current, sequence, typed=form, refusal=error)
     return RedirectResponse(reading_link(characteristic, sequence), 303)
 
 
@@ -289,9 +288,8 @@ def _reading(
     sequence: int,
     *,
     template: str = "characteristics/reading.html",
-    status: int = 200,
     typed: Mapping[str, str] | None = None,
-    problem: InbandError | None = None,
+    refusal: InbandError | None = None,
 ) -> Response:
     shown_decision = decision(session, current, sequence)
     version = version_of(session, current, shown_decision.reading["parameters_version"])
@@ -305,7 +303,7 @@ def _reading(
     return page(
         request,
         template,
-        status=status,
+        refusal=refusal,
         decision=shown_decision,
         reading=shown_decision.reading,
         characteristic=current.characteristic,
@@ -330,8 +328,6 @@ def _reading(
         chart_url=f"/api/v1/characteristics/{key}/figures/zones?{urlencode(around)}",
         may_exclude=caller.may("operator"),
         typed=typed or {},
-        problem=problem,
-        errors=by_field(problem) if problem else {},
         picture=touches_picture(limits, points) if points else None,
         residuals=residuals_of(limits, points) if points else [],
         sections=shown_decision.sections(limits),

@@ -63,8 +63,7 @@ def compare_page(
     return page(
         request,
         "compare/compare.html",
-        status=problem.status if problem else 200,
-        problem=problem,
+        refusal=problem,
         rows=rows,
         keys=keys,
         by=by.value,

@@ -25,7 +25,6 @@ from app.views.reports.bundle import Bundle
 from app.views.reports.jobs_api import Number, report_worker
 from app.views.reports.request import SectionName, context_of, typed
 from app.web.deps import Before, SessionDep, texts
-from app.web.forms import by_field
 from app.web.paging import address, part_of
 from app.web.templates import page
 from app.web.usual_periods import with_preset
@@ -120,7 +119,7 @@ def _page(
     return page(
         request,
         "reports/jobs.html",
-        status=problem.status if problem else 200,
+        refusal=problem,
         jobs=jobs,
         troubles={job.id: queries.troubles(session, job.id) for job in jobs.rows if job.problems},
         may_cancel=lambda job: queries.may_end(job, caller),
@@ -131,8 +130,6 @@ def _page(
         machines=_by_machine(session) if part is None else [],
         chosen=set(chosen),
         given=given or {},
-        problem=problem,
-        errors=by_field(problem) if problem else {},
         sections=[(name.value, queries.title_of(name)) for name in SectionName],
         papers=[(Paper.A4.value, "A4"), (Paper.LETTER.value, "Letter")],
         forms=[

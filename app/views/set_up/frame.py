@@ -9,9 +9,7 @@ from app.language.i18n import _
 from app.web.templates import page
 
 
-def setup_page(
-    request: Request, template: str, caller: Caller, tab: str, *, status: int = 200, **context: Any
-) -> Response:
+def setup_page(request: Request, template: str, caller: Caller, tab: str, **context: Any) -> Response:
     """A page of Set-up with the tabs that this caller may use."""
     tabs = [
         ("characteristics", _("Characteristics"), "/setup/characteristics"),
@@ -30,7 +28,6 @@ def setup_page(
     return page(
         request,
         f"set_up/{template}",
-        status=status,
         tabs=[(text, href, name == tab) for name, text, href in tabs],
         done=done(request.query_params.get("done", "")),
         may_edit=caller.may("engineer"),

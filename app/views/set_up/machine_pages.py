@@ -90,8 +90,8 @@ def machines_page(request: Request, session: SessionDep, caller: Viewer) -> Resp
 @router.get("/setup/machines/new")
 def new_machine_page(request: Request, session: SessionDep, caller: Engineer, like: str = "") -> Response:
     if like:
-        return _new(request, caller, _typed_like(session, like), {})
-    return _new(request, caller, {"control": "sinumerik", "type": "lathe"} | _usual_counts(), {})
+        return _new(request, caller, _typed_like(session, like))
+    return _new(request, caller, {"control": "sinumerik", "type": "lathe"} | _usual_counts())
 
 
 @router.post("/setup/machines/new")
@@ -110,21 +110,18 @@ def send_new_machine(request: Request, session: SessionDep, caller: Engineer, fo
     except InbandError as error:
         if not error.errors:
             raise
-        return _new(request, caller, form, by_field(error), error.status)
+        return _new(request, caller, form, error)
     return RedirectResponse(f"/setup/machines/{new_machine.key}?done=added", 303)
 
 
-def _new(
-    request: Request, caller: Caller, typed: Mapping[str, str], errors: Mapping[str, str], status: int = 200
-) -> Response:
+def _new(request: Request, caller: Caller, typed: Mapping[str, str], refusal: InbandError | None = None) -> Response:
     return setup_page(
         request,
         "machine_new.html",
         caller,
         "machines",
-        status=status,
+        refusal=refusal,
         typed=typed,
-        errors=errors,
         controls=controls(),
         stopping=stopping(),
         types=types(),
@@ -169,9 +166,7 @@ def send_machine(
     except InbandError as error:
         if not error.errors:
             raise
-        return _machine(
-            request, session, caller, address, machine, status=error.status, typed=form, errors=by_field(error)
-        )
+        return _machine(request, session, caller, address, machine, typed=form, refusal=error)
     return RedirectResponse(f"/setup/machines/{quote(machine)}?done=changed", 303)
 
 
@@ -193,8 +188,8 @@ def send_machine_key(
             session, machine=queries.machine_named(session, machine).key, name=form.get("name", ""), actor=caller.name
         )
     except InbandError as error:
-        errors = {f"key_{field}": message for field, message in by_field(error).items()}
-        return _machine(request, session, caller, address, machine, status=error.status, errors=errors)
+        errors = by_field(error, lambda field, message: (f"key_{field}", message))
+        return _machine(request, session, caller, address, machine, refusal=error, errors=errors)
     return _machine(request, session, caller, address, machine, new_key=new_key)
 
 
@@ -216,8 +211,8 @@ def _machine(
     address: str,
     key: str,
     *,
-    status: int = 200,
     typed: Mapping[str, str] | None = None,
+    refusal: InbandError | None = None,
     errors: Mapping[str, str] | None = None,
     new_key: Any = None,
 ) -> Response:
@@ -229,11 +224,11 @@ def _machine(
         "machine.html",
         caller,
         "machines",
-        status=status,
+        refusal=refusal,
+        errors=errors,
         machine=machine,
         machines=queries.machines(session),
         typed=typed or {name: _shown(getattr(machine, name)) for name in SHOWN},
-        errors=errors or {},
         controls=controls(),
         stopping=stopping(),
         types=types(),

@@ -106,7 +106,7 @@ def _overview(
         "notifications.html",
         caller,
         "notifications",
-        status=error.status if error else 200,
+        refusal=error,
         receivers=receivers,
         routes=[(row, _summary(row.rule, names, of_groups)) for row in queries.routes(session)],
         groups=[(row, *group_words(row, names, now)) for row in groups],
@@ -114,8 +114,6 @@ def _overview(
         part=part_of(rows, ON_PAGE, before, lambda row: row.delivery.id, here),
         everything=everything,
         typed=typed or {},
-        errors=by_field(error) if error else {},
-        problem=error if error and not error.errors else None,
         secret=secret,
         means=[(name, means_word(name)) for name in ("mail", "webhook", "apprise")],
         means_word=means_word,
@@ -204,7 +202,7 @@ def _route(
         "notification_route.html",
         caller,
         "notifications",
-        status=error.status if error else 200,
+        refusal=error,
         number=number,
         fits=fits,
         form=form,
@@ -334,7 +332,7 @@ def _own(
     return page(
         request,
         "access/notifications.html",
-        status=error.status if error else 200,
+        refusal=error,
         row=row,
         form=form,
         errors={} if of_browser is not None else errors,
@@ -345,7 +343,6 @@ def _own(
         browser_errors={} if of_browser is None else errors,
         last=next(iter(queries.deliveries(session, receiver_id=browser.id, limit=1)), None) if browser else None,
         delivery_word=delivery_word,
-        problem=error if error and not error.errors else None,
         done=done,
     )
 

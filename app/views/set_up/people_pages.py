@@ -13,7 +13,6 @@ from app.errors import InbandError, NotFound
 from app.language.i18n import _
 from app.views.set_up.frame import setup_page
 from app.web.deps import AddressDep, FormDep, SessionDep
-from app.web.forms import by_field
 
 router = APIRouter(include_in_schema=False)
 DONE = {"disable": "disabled", "enable": "enabled", "role": "role"}
@@ -60,7 +59,7 @@ def send_key(request: Request, session: SessionDep, caller: Admin, form: FormDep
     try:
         new_key = actions.add_role_key(session, name=form.get("name", ""), role=form.get("role", ""), actor=caller.name)
     except InbandError as error:
-        return _people(request, session, caller, status=error.status, typed=form, errors=by_field(error))
+        return _people(request, session, caller, typed=form, refusal=error)
     return _people(request, session, caller, new_key=new_key)
 
 
@@ -93,7 +92,7 @@ def send_person(
     except InbandError as error:
         if error.status == NotFound.status:
             raise
-        return _people(request, session, caller, status=error.status, problem=error)
+        return _people(request, session, caller, refusal=error)
     if person == caller.person_id and what != "enable":
         return RedirectResponse("/", 303)  # this page may not be theirs any more
     return RedirectResponse(f"/setup/people?done={DONE[what]}", 303)
@@ -104,16 +103,13 @@ def _people(
     session: Session,
     caller: Caller,
     *,
-    status: int = 200,
     typed: Mapping[str, str] | None = None,
-    errors: Mapping[str, str] | None = None,
     **more: Any,
 ) -> Response:
     content: dict[str, Any] = {
         "link": None,
         "link_role": None,
         "new_key": None,
-        "problem": None,
         "new_password": None,
     } | more
     return setup_page(
@@ -121,13 +117,11 @@ def _people(
         "people.html",
         caller,
         "people",
-        status=status,
         people=queries.people(session),
         invitations=queries.open_invitations(session),
         keys=[key for key in queries.role_keys(session) if key.revoked_at is None],
         roles=roles(),
         role_words={name: words.partition(":")[0] for name, words in roles()},
         typed=typed or {},
-        errors=errors or {},
         **content,
     )

@@ -60,7 +60,7 @@ def _sent(request: Request, session: Session, caller: Caller, typed: dict[str, s
             find_machine(session, typed.get("machine", "")),
         )
     except Invalid as error:
-        return _page(request, session, caller, typed, errors=by_field(error), status=error.status)
+        return _page(request, session, caller, typed, refusal=error)
     do = typed.get("do", "")
     if do in {"create", "change"} and examined.program is not None and examined.makes_a_characteristic:
         caller.must("engineer")
@@ -90,8 +90,7 @@ def _page(
     typed: Mapping[str, str],
     examined: CheckedProgram | None = None,
     *,
-    errors: Mapping[str, str] | None = None,
-    status: int = 200,
+    refusal: Invalid | None = None,
 ) -> Response:
     program = examined.program if examined else None
     fields = {"text": "", "control": examined.control if examined else "", "characteristic": "", "machine": ""} | dict(
@@ -106,9 +105,8 @@ def _page(
         "programs.html",
         caller,
         "programs",
-        status=status,
+        refusal=refusal,
         typed=fields,
-        errors=errors or {},
         controls=[("", _("automatic")), ("sinumerik", "Sinumerik"), ("fanuc", "Fanuc"), ("heidenhain", "Heidenhain")],
         plan=_plan_address(program),
         work_zero=_work_zero_address(program),

@@ -49,7 +49,7 @@ def _screens(
         "screens.html",
         caller,
         "screens",
-        status=error.status if error else 200,
+        refusal=error,
         screens=screens.screens(session),
         link=link,
         name=name,

@@ -58,7 +58,7 @@ def _page(
     return page(
         request,
         "station/context.html",
-        status=error.status if error else 200,
+        refusal=error,
         machine=named,
         row=row,
         fields=[(field.value, field_word(field)) for field in ContextField],

@@ -181,7 +181,7 @@ def _ask_alarm(
     return page(
         request,
         "station/ask_alarm.html",
-        status=error.status if error else 200,
+        refusal=error,
         machine=row.machine,
         row=row,
         action=action,
@@ -312,7 +312,7 @@ def _ask(
     return page(
         request,
         "station/ask.html",
-        status=error.status if error else 200,
+        refusal=error,
         machine=on.machine,
         question=verb.question(on, f"/station/{on.machine.key}/{where}"),
         **asked(on.session, at, form, error),
@@ -337,7 +337,7 @@ def _ask_note(
     return page(
         request,
         "station/ask_note.html",
-        status=error.status if error else 200,
+        refusal=error,
         machine=machine_named(session, key),
         key=token_hex(8),
         **asked(session, at, form, error),

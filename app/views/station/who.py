@@ -43,7 +43,6 @@ def asked(session: Session, at: AtStation, form: Mapping[str, str], error: Inban
     return {
         "form": form,
         "errors": errors,
-        "refusal": error,
         "asks_who": at.device is not None,
         "people": devices.people_at(session, at.device.id) if at.device else [],
         "longest": LONGEST_PIN,

@@ -171,6 +171,12 @@ class TestPages:
         fields = {"machine": running.machine, "text": "Words that were typed", "at": "2199-01-01T08:00"}
         assert "Words that were typed" in operator.send("/notes/new", 422, **fields)
 
+    def test_what_no_field_shows_is_said_at_the_top(self, running: Shop, server: Server) -> None:
+        operator = Person(server, "operator")
+        fields: dict[str, Any] = {"characteristic": running.characteristic, "key": "used"}
+        operator.send("/notes/new", text="First words", **fields)
+        assert "was sent with the key" in operator.send("/notes/new", 409, text="Other words", **fields)
+
     def test_a_time_that_the_clock_skips_is_refused_in_words_for_people(self) -> None:
         form = {"machine": "lathe", "text": "Oil", "at": "2026-03-29T02:30"}
         with in_zone(ZoneInfo("Europe/Belgrade")), pytest.raises(Invalid) as refused:
