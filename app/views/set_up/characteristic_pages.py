@@ -12,7 +12,7 @@ from starlette.responses import RedirectResponse
 from app.access.deps import Caller, Engineer, Viewer, require
 from app.core.fits import fit_of
 from app.core.natural import looks_natural
-from app.core.parameters import AVERAGE_LOCATIONS, BY_NAME
+from app.core.parameters import AVERAGE_LOCATIONS, BY_NAME, Mode, Parameters
 from app.core.plausibility import suggested_jump
 from app.core.suggested import SuggestedLimits
 from app.core.variants import forms_of
@@ -258,6 +258,16 @@ def _advised(session: Session, current: queries.CurrentCharacteristic) -> dict[s
     return {"study": row.study.id, "zero_range": suggested, "reason": gauge_wording.reason(row.study.id, advice)}
 
 
+def _why_it_measures_only(parameters: Parameters) -> str | None:
+    """Which of the two keeps it from correcting, or that both do; None where it corrects."""
+    by_mode, no_tool = parameters.mode is Mode.MEASURE_ONLY, parameters.tool_memory == 0
+    if by_mode and no_tool:
+        return _("It measures only: the mode is “Measure only”, and no tool is named (R10 = 0). Nothing is corrected.")
+    if by_mode:
+        return _("It measures only: the mode is “Measure only”. Nothing is corrected until another mode is chosen.")
+    return _("It measures only: no tool is named (R10 = 0). Nothing is corrected until one is.") if no_tool else None
+
+
 def _characteristic(
     request: Request,
     session: Session,
@@ -273,11 +283,11 @@ def _characteristic(
 ) -> Response:
     characteristic = current.characteristic
     forms = queries.forms(session, characteristic)
-    if typed is None:
-        typed = parameter_form.typed_from(current.version.parameters) | {
-            "name": characteristic.name,
-            "part": characteristic.part or "",
-        }
+    in_force = parameter_form.typed_from(current.version.parameters) | {
+        "name": characteristic.name,
+        "part": characteristic.part or "",
+    }
+    typed = in_force if typed is None else typed
     return setup_page(
         request,
         "characteristic.html",
@@ -288,7 +298,8 @@ def _characteristic(
         machine=current.machine,
         read=readings.count_of(session, characteristic),
         version=current.version,
-        in_force_measures_only=current.parameters.measures_only,
+        changed={name for name, text in in_force.items() if typed.get(name, "") != text},
+        measures_only=None if current.source else _why_it_measures_only(current.parameters),
         problem=problem,
         warnings=actions.warnings_of(
             current,

@@ -106,6 +106,32 @@ def test_a_refused_order_is_reported_at_once_in_the_words_of_the_server(
     assert shop.call("GET", f"/characteristics/{shop.characteristic}")["parameters"]["averaging_limit"] == 0.006
 
 
+def test_what_saves_is_in_sight_and_what_few_need_is_folded_but_printed(signed_in: Page, shop: Shop) -> None:
+    page = signed_in
+    page.set_viewport_size({"width": 1280, "height": 800})
+    page.goto(f"/setup/characteristics/{shop.characteristic}")
+    expect(page.get_by_role("button", name="Save")).to_be_in_viewport(ratio=1)
+    assert page.evaluate("document.documentElement.scrollHeight") <= 2400, "three screens at most, where it was five"
+    folded = [page.locator(f"[name={name}]") for name in ("variant", "max_step", "part")] + [
+        page.locator("#program-text")
+    ]
+    for field in folded:
+        expect(field).to_be_hidden()
+    page.emulate_media(media="print")
+    for field in folded:
+        expect(field).to_be_visible()
+    expect(page.get_by_role("button", name="Save")).to_be_hidden()
+    page.emulate_media(media="screen")
+    page.get_by_label("On this page").get_by_role("link", name="Probing").click()
+    expect(folded[0]).to_be_in_viewport()
+    page.locator("[name=path_factor]").focus()
+    tops = [
+        page.evaluate("which => document.querySelector(which).getBoundingClientRect().top", which)
+        for which in ("[name=path_factor]", ".save-bar")
+    ]
+    assert tops[0] + 44 <= tops[1], "what has the focus is not behind the key"
+
+
 def test_a_machine_and_its_key_by_keyboard_alone(signed_in: Page) -> None:
     page = signed_in
     page.goto("/setup/machines/new")

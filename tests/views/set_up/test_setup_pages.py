@@ -2,7 +2,7 @@
 
 import re
 from html import unescape
-from typing import get_type_hints
+from typing import Any, get_type_hints
 
 import httpx
 import pytest
@@ -178,8 +178,40 @@ class TestCharacteristics:
         assert any("The factor is missing" in sentence for sentence in errors(page)), "both at once"
         key = unique("measures")
         self.new(engineer, shop, key, tool_memory="0", average_memory="")
-        assert "It measures only" in engineer.open(f"/setup/characteristics/{key}")
+        assert "It measures only: no tool is named (R10 = 0)." in engineer.open(f"/setup/characteristics/{key}")
         assert shop.call("GET", f"/characteristics/{key}")["parameters"]["average_memory"] == 0
+
+    @pytest.mark.parametrize(
+        ("parameters", "said"),
+        [
+            (
+                {"mode": "measure_only"},
+                "the mode is “Measure only”. Nothing is corrected until another mode is chosen.",
+            ),
+            ({"mode": "measure_only", "tool_memory": 0}, "the mode is “Measure only”, and no tool is named (R10 = 0)."),
+        ],
+    )
+    def test_what_keeps_it_from_correcting_is_named(
+        self, engineer: Person, shop: Shop, parameters: dict[str, Any], said: str
+    ) -> None:
+        key = unique("kept")
+        shop.add(key, **parameters)
+        assert f"It measures only: {said}" in engineer.open(f"/setup/characteristics/{key}")
+
+    def test_a_fold_opens_where_something_in_it_is_refused_or_differs(self, engineer: Person, shop: Shop) -> None:
+        """What one has to look at is never hidden."""
+
+        def opened(page: str) -> list[str]:
+            return re.findall(
+                r'<details class="card more printed" open>.*?<div class="card-body[^"]*" id="(\w+)"', page, re.DOTALL
+            )
+
+        path = f"/setup/characteristics/{shop.characteristic}"
+        page = engineer.open(path)
+        assert opened(page) == []
+        refused = values(page) | {"max_step": "much", "reason": "to see"}
+        assert opened(engineer.post(path, 422, **refused).text) == ["bounds"]
+        assert opened(engineer.open(f"{path}?points=3&plausible_jump=0.01")) == ["bounds", "probing"]
 
     def test_everything_that_is_missing_is_said_at_once(self, engineer: Person, shop: Shop) -> None:
         nothing = dict.fromkeys(("name", "nominal", "upper_deviation", "lower_deviation", "tool_memory", "factor"), "")
