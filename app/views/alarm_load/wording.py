@@ -26,8 +26,8 @@ def made_by(kind: str) -> str:
         "offset_limit": _("largest sum of corrections"),
         "offset_differs": _("offset that the control reports"),
         "opposite_effect": _("factor, or the offset register"),
-        "early_effect": _("machined_at, correction_in_effect, or the confirmation"),
-        "correction_in_doubt": _("correction_in_effect"),
+        "early_effect": _("the machine's clock, or what it says is in effect"),
+        "correction_in_doubt": _("what the machine says is in effect"),
         "unusual_gain": _("factor"),
         "characteristics_disagree": _("targets and empirical values of two characteristics"),
         "corrections_not_taken": _("INBAND_CORRECTIONS_TAKEN_WITHIN"),
@@ -55,10 +55,16 @@ def quieter_words(loud: Loud) -> str:
     found, kind = loud.quieter, loud.cause.kind
     if found is None:
         if kind in {"oversize", "undersize", "hunting"} and loud.characteristic is not None:
-            return _("not computed here: What if replays other R33, R34 and k")
+            return _("not computed: replay other R33, R34 and k")
         return _("not computed")
     if kind in {"oversize", "undersize"}:
-        text = _("R33 halved: {left} parts out in place of {n}, in a replay of the last {readings} readings")
+        text = (
+            _("R33 halved: {left} out of tolerance in place of {n}, in a replay of the last {readings} readings")
+            if found.left < found.alarms
+            else _(
+                "R33 halved does not help: {left} out of tolerance, {n} as it is, in a replay of the last {readings} readings"
+            )
+        )
         return text.format(left=found.left, n=found.alarms, readings=REPLAYED)
     left = _("{left} of {n} alarms left").format(left=found.left, n=found.alarms)
     match kind:

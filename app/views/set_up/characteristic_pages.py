@@ -259,7 +259,7 @@ def _advised(session: Session, current: queries.CurrentCharacteristic) -> dict[s
 
 
 def _why_it_measures_only(parameters: Parameters) -> str | None:
-    """Which of the two keeps it from correcting, or that both do; None where it corrects."""
+    """Words for what keeps it from correcting: mode, missing tool, or both. None where it corrects."""
     by_mode, no_tool = parameters.mode is Mode.MEASURE_ONLY, parameters.tool_memory == 0
     if by_mode and no_tool:
         return _("It measures only: the mode is “Measure only”, and no tool is named (R10 = 0). Nothing is corrected.")
