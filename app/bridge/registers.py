@@ -102,6 +102,10 @@ class Registers(Protocol):
         """A reason why the offset must not be written now (program running, tool in use); None if it may be."""
 
 
+class _NotNow(Exception):
+    """An offset must not be written now; the text says why."""
+
+
 class RegisterLink:
     """A control with a register block: a `Link` and an `OffsetAccess`."""
 
@@ -358,21 +362,23 @@ class RegisterLink:
         """
         self._direct = {order.number: outcome for order in orders if (outcome := self._direct.get(order.number))}
         written: list[Order] = []
+        waiting: dict[str, list[Order]] = {}
         for order in orders:
             if order.number in self._direct:
                 continue
             try:
                 if await self._compare_and_set(order):
                     written.append(order)
-            except Misconfigured as error:
-                self.remark = str(error)
+            except (Misconfigured, _NotNow) as error:
+                waiting.setdefault(str(error), []).append(order)
+        self.remark = " ".join(filter(None, (self.remark, *(_waits(them, why) for why, them in waiting.items()))))
         if written:
             await asyncio.sleep(self.machine.interval)  # a control shows a new value only after its next sampling tick
         for order in written:
             await self._note_direct(order, await self._offset_of(self._location(order.tool_memory)))
 
     async def _compare_and_set(self, order: Order) -> bool:
-        """Tell if the offset was written."""
+        """Tell if the offset was written. Raises `_NotNow` where the control must not be written to now."""
         location = self._location(order.tool_memory)
         before, after = (location.to_control(value, self.machine.unit) for value in (order.before, order.after))
         held = await self._offset_of(location)
@@ -380,8 +386,7 @@ class RegisterLink:
             await self._note_direct(order, held)
             return False
         if reason := await self.registers.against_writing(location):
-            self.remark = f"Correction {order.number} waits: {reason}"
-            return False
+            raise _NotNow(reason)
         await self.registers.write_offset(location, round(after, 6))
         return True
 
@@ -396,7 +401,8 @@ class RegisterLink:
             await self._write(Register.APPLIED, order.number)
             self._direct[order.number] = Outcome(order.number, applied=True, offset=offset)
         else:
-            reason = f"The control holds {held:.4f}, expected was {before:.4f}."
+            unit, decimals = self.machine.unit, 5 if self.machine.unit == "inch" else 4
+            reason = f"The control holds {held:.{decimals}f} {unit}, expected was {before:.{decimals}f} {unit}."
             self._direct[order.number] = Outcome(order.number, False, offset, reason, differs=True)
 
     # --- decisions
@@ -498,3 +504,9 @@ def _same(found: float, written: float) -> bool:
     What is not a number is not the same.
     """
     return abs(found - written) < HALF_A_STEP
+
+
+def _waits(orders: Sequence[Order], reason: str) -> str:
+    """The sentence about orders that wait for the same reason: each with its tool, as it stands in the alarms of others, too."""
+    named = ", ".join(f"{each.number} of tool memory {each.tool_memory}" for each in orders)
+    return f"{'Correction' if len(orders) == 1 else 'Corrections'} {named} {'waits' if len(orders) == 1 else 'wait'}: {reason}"

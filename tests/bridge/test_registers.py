@@ -514,6 +514,22 @@ def test_a_direct_write_is_a_comparison_first(held: float, writes: int, *, appli
     run(story())
 
 
+def test_two_offsets_that_differ_are_not_said_with_the_same_digits() -> None:
+    """A ten-thousandth of an inch is 2.5 µm."""
+    model = Model(unit=Unit.INCH)
+    made(model)
+    model.offsets[PLACE] = 0.00034
+
+    async def story() -> None:
+        link, _ = link_of(model, corrections="direct", unit="inch")
+        await link.fetch(Position())
+        await link.offer([Order(18, 3, 0.0076, 0.010)])
+        [outcome] = await link.outcomes()
+        assert outcome.reason == "The control holds 0.00034 inch, expected was 0.00030 inch."
+
+    run(story())
+
+
 def test_a_direct_write_waits_for_its_gate() -> None:
     model = Model()
     made(model)
@@ -525,7 +541,13 @@ def test_a_direct_write_waits_for_its_gate() -> None:
         await link.offer([Order(18, 3, 0.0, 0.010)])
         assert await link.outcomes() == []
         assert model.offsets[PLACE] == 0.0
-        assert link.remark == "Correction 18 waits: The program is running."
+        assert link.remark == "Correction 18 of tool memory 3 waits: The program is running."
+        await link.fetch(Position())
+        await link.offer([Order(18, 3, 0.0, 0.010), Order(19, 4, 0.0, 0.010)])
+        assert link.remark == (
+            "Correction 18 of tool memory 3 waits: The program is running."
+            " Correction 19 of tool memory 4 waits: Tool memory 4 has no location in the configuration."
+        )
         registers.may_write = None
         await link.offer([Order(18, 3, 0.0, 0.010)])
         assert model.offsets[PLACE] == pytest.approx(0.010)

@@ -36,8 +36,8 @@ SETTLES = timedelta(minutes=5)
 class Untaken(NamedTuple):
     """Pending corrections of a tool. waiting: how many; most: of one characteristic; first, since: the oldest; measured: its last part.
 
-    reason: why its bridge holds them back, if it says so and not because of a hold. said: what it says of the control. bridge: the
-    machine has one; carried: which brings corrections.
+    reason: why its bridge holds them back, if it says so and not because of a hold. said: what it says of the control, and nothing
+    of other tools. bridge: the machine has one; carried: which brings corrections.
     """
 
     machine_id: int
@@ -186,11 +186,21 @@ def _untaken(row: Row[Any]) -> Untaken:
         since=row.since,
         measured=row.measured,
         reason=reason,
-        said=row.detail,
+        said=_of_this_tool(row),
         bridge=row.hold_all is not None,
         carried=any(place.get("corrected", True) for place in row.locations or ()),
         now=row.now,
     )
+
+
+def _of_this_tool(row: Row[Any]) -> str | None:
+    """Return what the bridge says without why it holds corrections of other tools back."""
+    held_back: Sequence[dict[str, Any]] = row.held_back or ()
+    own = {each["reason"] for each in held_back if each["tool_memory"] == row.tool_memory}
+    said = row.detail or ""
+    for of_other in {each["reason"] for each in held_back} - own:
+        said = said.replace(of_other, "")
+    return " ".join(said.split()) or None
 
 
 def _values(waiting: Untaken) -> dict[str, Any]:

@@ -97,6 +97,17 @@ def test_what_the_bridge_says_of_the_control_is_in_the_alarm(shop: Shop, runs: R
     assert alarm["text"].endswith("Its bridge says: Correction 1 waits: tool 3 is in use.")
 
 
+def test_what_the_bridge_says_of_other_tools_is_not_in_the_alarm(shop: Shop, runs: Runs) -> None:
+    for size in (6, 12, 18, 24, 30):
+        shop.read(size)
+    waited(shop, 6)
+    other = HELD | {"tool_memory": 4, "reason": "Correction 9 is for tool memory 4, which has no location."}
+    said = "The date of the control is wrong."
+    beat(shop, locations=[{"tool_memory": 3}], held_back=[other], detail=f"{said} {other['reason']}")
+    [alarm] = runs(3)
+    assert alarm["text"].endswith(f"Its bridge says: {said}")
+
+
 def test_what_the_bridge_holds_back_is_reported_at_once_with_its_reason(shop: Shop, runs: Runs) -> None:
     shop.read(6)
     beat(shop, held_back=[HELD], hold_all=True)
