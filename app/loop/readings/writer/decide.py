@@ -8,7 +8,6 @@ are decided by the same lines. A reading that is refused moves nothing.
 from collections.abc import Sequence
 from contextlib import suppress
 from datetime import UTC, datetime
-from functools import partial
 
 from app.core.decision.decide import Decision, LoopState, ReadingAlarm, decide, needs_approval, outstanding_effect
 from app.core.decision.limits import Zone
@@ -102,34 +101,33 @@ def decide_reading(pending: PendingWrites, entry: Entry, reading: ReadingIn, now
     paused_by = stream.paused_by if tool is None or stream.paused_by is not None else tool.paused_by
     timed = time_decides(stream, reading, compensated, previous_tool=previous_tool)
     lag = lag_with(stream, Arrival(sequence, now, measured_at), timed=timed)
-    if lag is not None and paused_by is not None:  # a part that is out is not taken for one on the way
-        previous_tool, outstanding, amounts = False, (), ()
-    state = LoopState(
-        average.average if average else 0.0,
-        issued_total(pending, tool) if parameters.max_total is not None else 0.0,
-        paused_by is not None,
-    )
-    judged = partial(
-        decide,
-        parameters,
-        deviation=deviation,
-        outstanding=outstanding_effect(amounts, parameters.factor) if amounts else 0.0,
-        previous_tool=previous_tool,
-        accepted=results is None or not results.rejected,
-        jump=jump,
-        by_hand=parameters.rules.of_tool and tool is not None and tool.set_by_hand,
-        fault=Code.FIRST_MOVE_TRIGGERED if reading.first_move_triggered else Code.TOUCH_FAULT if fault else None,
-    )
-    decision = judged(state=state)
+    total = issued_total(pending, tool) if parameters.max_total is not None else 0.0
+
+    def judged(*, paused: bool) -> Decision:
+        as_it_is = paused and lag is not None  # a part that is out is not taken for one on the way
+        return decide(
+            parameters,
+            LoopState(average.average if average else 0.0, total, paused),
+            deviation,
+            outstanding=outstanding_effect(amounts, parameters.factor) if amounts and not as_it_is else 0.0,
+            previous_tool=previous_tool and not as_it_is,
+            accepted=results is None or not results.rejected,
+            jump=jump,
+            by_hand=parameters.rules.of_tool and tool is not None and tool.set_by_hand,
+            fault=Code.FIRST_MOVE_TRIGGERED if reading.first_move_triggered else Code.TOUCH_FAULT if fault else None,
+        )
+
+    decision = judged(paused=paused_by is not None)
     late = stream.last_measured_at is not None and measured_at < stream.last_measured_at
     newest = None if compensated is None or late or jump or fault else part_of(sequence, decision, compensated)
-    opposed = pauses(pending, stream, newest, reading, now) if decision.amount is not None and newest else None
-    if opposed is None and paused_by is None and lag is not None:
+    asking = newest if decision.amount is not None else None
+    opposed = pauses(pending, stream, asking, reading, now)
+    if opposed is None and paused_by is None:
         opposed = behind(pending, stream, decision, lag, previous_tool=previous_tool)
-    if opposed is not None and lag is not None:
-        outstanding, judged = (), partial(judged, outstanding=0.0, previous_tool=False)
     if opposed is not None:
-        paused_by, decision = opposed, judged(state=state._replace(paused=True))
+        paused_by, decision = opposed, judged(paused=True)
+    if paused_by is not None and lag is not None:
+        outstanding = ()
     alarms = [_signal(pending, stream, signal, sequence, decision, results, fault) for signal in decision.alarms]
     name_correction(alarms, stream, newest)
     name_clock(alarms if timed else (), reading, now)

@@ -34,16 +34,18 @@ def remember(stream: PendingStream, sequence: int, decision: Decision, compensat
 
 
 def pauses(
-    pending: PendingWrites, stream: PendingStream, newest: Part, reading: ReadingIn, now: datetime
+    pending: PendingWrites, stream: PendingStream, newest: Part | None, reading: ReadingIn, now: datetime
 ) -> PendingAlarm | None:
     """Pause the tool if its corrections did the opposite of what they asked, or act before they are counted; the alarm, or None.
 
-    newest: what is left of the reading that asks for the next correction.
+    newest: what is left of the reading that asks for the next correction; None if none does.
     """
     tool, parameters = stream.tool, stream.parameters
+    if tool is None or newest is None:
+        return None
     parts = [*stream.parts[1 - LONGEST :], newest]
     begin = sum(part.sequence <= stream.start.gain_from for part in parts)
-    if tool is None or len(parts) - begin < 3:
+    if len(parts) - begin < 3:
         return None
     deviation, compensated = (
         np.array([part.deviation for part in parts]),

@@ -47,11 +47,11 @@ def lag_with(stream: PendingStream, arrival: Arrival, *, timed: bool) -> float |
 
 
 def behind(
-    pending: PendingWrites, stream: PendingStream, decision: Decision, lag: float, *, previous_tool: bool
+    pending: PendingWrites, stream: PendingStream, decision: Decision, lag: float | None, *, previous_tool: bool
 ) -> PendingAlarm | None:
-    """Pause the tool if the clock is behind, of which alone it is known what the part was cut without (`time_decides`); the alarm."""
+    """Pause the tool if the clock is behind (`lag_with`), by which alone it is known what the part was cut without; the alarm."""
     tool = stream.tool
-    if tool is None or not (previous_tool or decision.amount is not None):
+    if tool is None or lag is None or not (previous_tool or decision.amount is not None):
         return None
     said: dict[str, Any] = {"by": "clock", "before": previous_tool, "readings": FEWEST, "lag": round(lag, 1)}
     return paused(pending, stream, tool, decision.deviation, EARLY, said)
