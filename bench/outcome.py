@@ -30,7 +30,8 @@ from app.bridge.configuration import configuration_from
 from app.bridge.program import link_of
 from app.bridge.store import Store
 from app.bridge.unit import Unit, ended
-from app.core.ring import SLOTS, Register, Status
+from app.core.ring import INCH, SLOTS, Register, Status
+from app.core.ring import Unit as Lengths
 from app.simulators.controls import simulator_named
 from app.simulators.controls.model import OWNERS, SISTERS, UNMAPPED, Feature, Model, Steps, six_tools
 from bench.plant import PARAMETERS, TARGET, plant
@@ -87,16 +88,16 @@ class Process(Model):
             yield
 
     def size(self, feature: Feature) -> float:
-        """The size that is cut and measured now."""
+        """The size that is cut and measured now, in the control's unit."""
+        scale = INCH if self.unit == Lengths.INCH else 1.0
         scatter = random.Random(f"{feature.number} {self.parts}").gauss(0.0, feature.noise)
         worn = self.start + feature.wear * (self.parts - self.new_at.get(feature.tool, 0))
         if self.broken and feature.tool == BROKEN:
             worn += BREAK
-        deviation = (
-            worn + scatter + self.amiss * self.offsets[self.place_of(self.swapped.get(feature.tool, feature.tool))]
-        )
+        offset = self.offsets[self.place_of(self.swapped.get(feature.tool, feature.tool))] * scale
+        deviation = worn + scatter + self.amiss * offset
         self.sizes.setdefault(feature.number, []).append(deviation)
-        return feature.nominal + deviation
+        return (feature.nominal + deviation) / scale
 
     def place_of(self, tool: int) -> tuple[int, int, str]:
         """The offset of a tool."""

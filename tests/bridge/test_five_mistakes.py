@@ -11,6 +11,7 @@ from typing import Any, NamedTuple, cast
 
 import pytest
 
+from app.core.ring import Unit
 from app.jobs.actions import run_jobs
 from app.loop.tools.jobs import JOBS
 from app.loop.tools.untaken import Watch
@@ -25,6 +26,8 @@ from tests.loop.tools.test_untaken import age_corrections
 from tests.shop import Shop
 
 WAYS = ["rest", "haas", "haas direct", "heidenhain", "mqtt", "opcua", "opcua direct"]
+INCHES = ["haas", "heidenhain", "opcua direct"]
+"""Whose control works in inches as well: it shows, prints and takes them."""
 TOOLS = (1, 2, 3, 4, 5)
 OUTAGE = range(4, 12)  # parts, within an hour
 RADIUS = 30  # parts within which a gain of 2 is reported on every tool
@@ -126,13 +129,15 @@ def said(one: Play) -> list[dict[str, Any]]:
     return items
 
 
-def after(server: Server, folder: Path, patch: pytest.MonkeyPatch, mistake: str, way: str) -> Play:
-    """The machine after the parts of a mistake, when the jobs of the server have run."""
+def after(
+    server: Server, folder: Path, patch: pytest.MonkeyPatch, mistake: str, way: str, unit: Unit = Unit.MM
+) -> Play:
+    """The machine after the parts of a mistake, when the jobs of the server have run. unit: of its control."""
     if way == "mqtt" and mosquitto() is None:
         pytest.skip("mosquitto is not installed")
     made = MISTAKES[mistake]
     one = play(server, way, made.parts)
-    one.eventful = False
+    one.eventful, one.process.unit = False, unit
     made.begin(one, patch)
     secret = one.set_up()
     if way == "rest":
@@ -183,3 +188,15 @@ def test_over_each_way_in(
     if mistake == "server away":
         [outcome] = later(as_shop(server, one), 5)["outcome"]
         assert f"{len(OUTAGE) * len(one.keys)} readings came late" in outcome["text"]
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("way", INCHES)
+@pytest.mark.parametrize("mistake", sorted(MISTAKES))
+def test_at_a_control_that_works_in_inches(
+    server: Server, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, mistake: str, way: str
+) -> None:
+    one = after(server, tmp_path, monkeypatch, mistake, way, Unit.INCH)
+    named(one, mistake)
+    if mistake == "wrong sign":
+        assert max(applied(one).values()) <= 2
