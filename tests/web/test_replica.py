@@ -200,6 +200,7 @@ class TestReportsInTheBackground:
         until(lambda: shop.call("GET", f"/reports/{job['id']}")["state"] not in {"queued", "running"})
         return shop.call("GET", f"/reports/{job['id']}")
 
+    @pytest.mark.long  # the process that makes them gives way to all others: seconds alone, a quarter of a minute beside a run
     def test_lack_nothing_that_was_stored_when_they_were_asked_for(self, followed: Shop, servers: Cluster) -> None:
         with paused(servers):
             followed.add(f"{followed.characteristic}-late")
