@@ -1,11 +1,12 @@
 // <wall-screen src="/wall/now" every="5" version="0.1.0" data-lost data-none data-refused data-nokey>
 // The wall screen. Asks again and again, for as long as it hangs there, with the key that stands behind the # of the address: no
-// server writes that into a log. Without an answer it says since when, and what was shown stays, paler; it goes on by itself.
-// After an update of the server it loads itself again. `.wall-trouble` says what is wrong, `.wall-now` holds what the server says.
+// server writes that into a log. Without an answer for some seconds it says since when, and what was shown stays, paler; it goes on
+// by itself. After an update of the server it loads itself again. `.wall-trouble` says what is wrong, `.wall-now` holds what the server says.
 
 import { age } from "./times.js";
 
 const PATIENCE = 15_000; // ms for one answer
+const CALM = 5_000; // ms without an answer before it is said in red
 const REFUSED = 60_000; // ms between two looks with a key that was refused
 
 class WallScreen extends HTMLElement {
@@ -23,6 +24,7 @@ class WallScreen extends HTMLElement {
 
   async look() {
     let pause = Number(this.getAttribute("every")) * 1_000;
+    this.unanswered ??= Date.now();
     try {
       const answer = await fetch(this.getAttribute("src"), {
         headers: { Authorization: `Bearer ${decodeURIComponent(location.hash.slice(1))}` },
@@ -35,19 +37,20 @@ class WallScreen extends HTMLElement {
         this.say("refused", this.dataset.refused);
         pause = REFUSED;
       } else if (answer.ok) await this.take(await answer.text());
-      else this.lose();
     } catch {
-      this.lose();
+      // without an answer: show() says so in time
     }
+    this.show();
     setTimeout(() => this.look(), pause);
   }
 
   take(text) {
     const made = new DOMParser().parseFromString(text, "text/html").querySelector(".wall-page");
-    if (!made) return this.lose();
+    if (!made) return;
     if (made.dataset.version !== this.getAttribute("version")) return this.renew();
     this.now.replaceChildren(made);
     this.seen = Date.now();
+    this.unanswered = null;
     this.clock = made.querySelector("time")?.textContent;
     this.say("live", "");
   }
@@ -58,13 +61,8 @@ class WallScreen extends HTMLElement {
     if (answer.ok) location.reload();
   }
 
-  lose() {
-    if (this.getAttribute("state") !== "refused") this.setAttribute("state", "lost");
-    this.show();
-  }
-
   show() {
-    if (this.getAttribute("state") !== "lost") return;
+    if (this.getAttribute("state") === "refused" || !this.unanswered || Date.now() - this.unanswered < CALM) return;
     const words = this.seen
       ? this.dataset.lost.replace("{since}", this.clock).replace("{age}", age((Date.now() - this.seen) / 1000))
       : this.dataset.none;

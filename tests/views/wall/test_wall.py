@@ -132,12 +132,21 @@ def stranger(browser: Browser) -> Iterator[BrowserContext]:
     context.close()
 
 
-def test_it_is_never_blank(stranger: BrowserContext, common_shop: Shop, server: Server) -> None:
+def test_it_is_never_blank_and_red_only_after_some_seconds(
+    stranger: BrowserContext, common_shop: Shop, server: Server
+) -> None:
     screen = common_shop.call("POST", "/wall-screens", 201, name=unique("Hall"))
     page = stranger.new_page()
+    page.clock.install()
     page.route("**/wall/now", lambda _route: None)  # a server that is starting
     page.goto(f"{server.url}/wall#{screen['url'].partition('#')[2]}")
-    expect(page.locator(".wall-trouble")).to_contain_text("Connecting")
+    trouble = page.locator(".wall-trouble")
+    expect(trouble).to_contain_text("Connecting")
+    quiet = trouble.evaluate("each => getComputedStyle(each).color")
+    assert quiet == page.locator("body").evaluate("each => getComputedStyle(each).color")
+    page.clock.fast_forward(6_000)
+    expect(trouble).to_contain_text("No connection to the server")
+    expect(trouble).not_to_have_css("color", quiet)
 
 
 def test_it_loads_itself_again_after_an_update_only_where_that_answers(
@@ -151,6 +160,7 @@ def test_it_loads_itself_again_after_an_update_only_where_that_answers(
     page.locator("wall-screen").evaluate("each => each.setAttribute('version', '0.0.1')")
     page.route("**/wall", lambda route: route.abort())
     page.clock.fast_forward(6_000)
+    page.clock.fast_forward(6_000)  # red only when it has failed for some seconds
     expect(page.locator(".wall-trouble")).to_contain_text("No connection since")
     page.unroute("**/wall")
     page.clock.fast_forward(6_000)
@@ -168,6 +178,8 @@ def test_it_says_since_when_it_is_old_goes_on_and_ends_when_revoked(
     tile, trouble = page.locator(".wall-machines li").first, page.locator(".wall-trouble")
     expect(tile).to_be_visible()
     page.route("**/wall/now", lambda route: route.abort())
+    page.clock.fast_forward(6_000)
+    expect(trouble).to_be_hidden()
     page.clock.fast_forward(6_000)
     expect(trouble).to_contain_text("No connection since")
     expect(tile).to_be_visible()
