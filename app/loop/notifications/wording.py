@@ -55,12 +55,15 @@ def _days() -> list[str]:
 
 
 def when(hours: Mapping[str, Any]) -> str:
-    """A stored part of the week, such as Mon–Fri 06:00–14:00."""
+    """A stored part of the week: Mon–Fri 06:00–14:00; Sat, Sun all day."""
     names, days = _days(), sorted(hours["days"])
     text = ", ".join(names[day - 1] for day in days)
     if len(days) > 2 and days == list(range(days[0], days[-1] + 1)):
         text = f"{names[days[0] - 1]}–{names[days[-1] - 1]}"
-    return f"{text} {hours['begins']}–{hours['ends']}"
+    begins, ends = hours["begins"], hours["ends"]
+    if begins == "00:00" and ends in ("00:00", "24:00"):
+        return f"{text} {_('all day')}"
+    return f"{text} {begins}–{ends}"
 
 
 def on_duty_word(group: str) -> str:

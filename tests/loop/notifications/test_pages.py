@@ -166,7 +166,7 @@ def test_what_ones_own_form_does_not_hold_is_kept(server: Server, page: str, fie
     given = fields | {"quiet": quiet, "away_until": "2099-01-01T00:00:00Z"}
     set_up = viewer.browser.put(path, json=given, headers={"X-CSRF-Token": viewer.csrf()}).json()
     text = viewer.open("/account/notifications")
-    assert "Sat, Sun 00:00–00:00; Mon, Tue 20:00–06:00" in text
+    assert "Sat, Sun all day; Mon, Tue 20:00–06:00" in text
     assert re.search(r"Away until .*>1 Jan 2099", text)
     shown: dict[str, Any] = {"quiet-begins": "00:00", "quiet-ends": "00:00"}
     viewer.send(f"/account/notifications{page}", **fields | shown)
