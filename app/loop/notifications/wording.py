@@ -62,7 +62,7 @@ def when(hours: Mapping[str, Any]) -> str:
         text = f"{names[days[0] - 1]}–{names[days[-1] - 1]}"
     begins, ends = hours["begins"], hours["ends"]
     if begins == "00:00" and ends in ("00:00", "24:00"):
-        return f"{text} {_('all day')}"
+        return _("{days} all day").format(days=text)
     return f"{text} {begins}–{ends}"
 
 
