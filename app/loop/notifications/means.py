@@ -5,6 +5,7 @@ import hashlib
 import hmac
 import secrets
 import smtplib
+import socket
 import ssl
 import threading
 import time
@@ -131,10 +132,7 @@ def _by_mail(job: Job, settings: Settings) -> str:
         mail.add_attachment(job.message.picture, "image", "png", filename="readings.png", disposition="inline")
     server = _connected(host, port, settings)
     try:
-        if settings.mail_security == "starttls":
-            server.starttls(context=_tls(settings.ca_file))
-        if settings.mail_user:
-            _sign_in(server, settings.mail_user, settings.mail_password or "")
+        _introduced(server, settings)
         try:
             _wait(server, LIMIT)  # some look through a mail for long before they take it
             server.send_message(mail)
@@ -151,7 +149,7 @@ def _by_mail(job: Job, settings: Settings) -> str:
 
 
 def _connected(host: str, port: str, settings: Settings) -> smtplib.SMTP:
-    """The mail server, after its greeting. Raises `Refused` where it speaks first with encryption, or without, against the setting."""
+    """The mail server, after its greeting. Raises `Refused` where nobody greets, or with encryption, or without, against the setting."""
     try:
         if settings.mail_security == "tls":
             return smtplib.SMTP_SSL(host, int(port or 465), timeout=STEP, context=_tls(settings.ca_file))
@@ -163,6 +161,29 @@ def _connected(host: str, port: str, settings: Settings) -> smtplib.SMTP:
         raise Refused(reason.format(server=settings.mail_server, error=error.reason)) from None
     except smtplib.SMTPServerDisconnected:
         reason = _("{server} did not greet: is it encrypted from the first byte, INBAND_MAIL_SECURITY=tls?")
+        raise Refused(reason.format(server=settings.mail_server)) from None
+    except (socket.gaierror, ConnectionRefusedError, TimeoutError) as error:
+        reason = {
+            socket.gaierror: _("the name of the mail server {server} is not known here: check INBAND_MAIL_SERVER"),
+            ConnectionRefusedError: _("no mail server listens at {server}: check INBAND_MAIL_SERVER, and that it runs"),
+            TimeoutError: _("{server} does not answer: check INBAND_MAIL_SERVER, its port, and firewalls between"),
+        }[type(error)]
+        raise Refused(reason.format(server=settings.mail_server)) from None
+
+
+def _introduced(server: smtplib.SMTP, settings: Settings) -> None:
+    """Encrypt and sign in as set. Raises `Refused` where the mail server offers no such thing, `SMTPAuthenticationError`."""
+    try:
+        if settings.mail_security == "starttls":
+            server.starttls(context=_tls(settings.ca_file))
+    except smtplib.SMTPNotSupportedError:
+        reason = _("{server} offers no STARTTLS: INBAND_MAIL_SECURITY=tls, or none for one on this computer?")
+        raise Refused(reason.format(server=settings.mail_server)) from None
+    try:
+        if settings.mail_user:
+            _sign_in(server, settings.mail_user, settings.mail_password or "")
+    except smtplib.SMTPNotSupportedError:
+        reason = _("{server} lets nobody sign in this way: is INBAND_MAIL_USER needed, and INBAND_MAIL_SECURITY right?")
         raise Refused(reason.format(server=settings.mail_server)) from None
 
 
@@ -192,14 +213,17 @@ def _wait(server: smtplib.SMTP, seconds: float) -> None:
 
 
 def _said(error: smtplib.SMTPResponseException | smtplib.SMTPRecipientsRefused) -> str:
-    """The status and the words with which a mail server refused a mail."""
+    """The status and the words with which a mail server refused a mail, and the setting that it is about."""
     if isinstance(error, smtplib.SMTPResponseException):
         said: list[tuple[int, bytes | str]] = [(error.smtp_code, error.smtp_error)]
     else:
         said = list(error.recipients.values())
-    return "; ".join(
+    text = "; ".join(
         f"{code} {words.decode(errors='replace') if isinstance(words, bytes) else words}" for code, words in said
     )
+    if isinstance(error, smtplib.SMTPAuthenticationError):
+        return text + "; " + _("check INBAND_MAIL_USER and INBAND_MAIL_PASSWORD")
+    return text + "; " + _("check INBAND_MAIL_FROM") if isinstance(error, smtplib.SMTPSenderRefused) else text
 
 
 @cache

@@ -35,6 +35,11 @@ class Mails:
             more |= {"ssl_context": context} if first else {"tls_context": context, "require_starttls": True}
         self.controller = Controller(self, hostname="127.0.0.1", port=0, ready_timeout=60, **more)
 
+    async def handle_MAIL(self, server: SMTP, session: Any, envelope: Any, address: str, options: Any) -> str:  # noqa: N802
+        """Refuse a sender, or take it."""
+        envelope.mail_from = address
+        return "553 Not yours" if address.startswith("refused") else "250 OK"
+
     async def handle_RCPT(self, server: SMTP, session: Any, envelope: Any, address: str, options: Any) -> str:  # noqa: N802
         """Refuse a recipient, or take it."""
         if address.startswith("refused"):

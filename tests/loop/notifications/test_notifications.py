@@ -627,13 +627,43 @@ class TestWhatAMailServerSays:
     def test_one_that_is_not_there_has_not(self) -> None:
         assert not mail("localhost:9", mail_security="none").perhaps
 
+    @pytest.mark.parametrize("security", ["none", "starttls", "tls"])
+    @pytest.mark.parametrize(
+        ("failure", "said"),
+        [
+            (
+                socket.gaierror(-2, "Name or service not known"),
+                "the name of the mail server mail.example is not known here",
+            ),
+            (ConnectionRefusedError(111, "Connection refused"), "no mail server listens at mail.example"),
+            (TimeoutError("timed out"), "mail.example does not answer"),
+        ],
+    )
+    def test_what_cannot_be_reached_says_which_setting_to_look_at(
+        self, monkeypatch: pytest.MonkeyPatch, failure: OSError, said: str, security: str
+    ) -> None:
+        def fails(*_where: Any, **_how: Any) -> None:
+            raise failure
+
+        monkeypatch.setattr(socket, "create_connection", fails)
+        answer = mail("mail.example", mail_security=security)
+        assert said in answer.text
+        assert "check INBAND_MAIL_SERVER" in answer.text
+        assert not answer.perhaps, "nothing was under way"
+
+    def test_a_sender_that_is_refused_and_a_sign_in_that_is_not_offered(self, mails: tuple[Mails, str]) -> None:
+        answer = mail(mails[1], mail_security="none", mail_user="anna", mail_password="secret")
+        assert "INBAND_MAIL_USER" in answer.text
+        answer = mail(mails[1], mail_security="none", mail_from="refused@example.com")
+        assert answer.text == "553 Not yours; check INBAND_MAIL_FROM"
+
 
 class TestEncryption:
     def test_a_mail_server_without_it_gets_nothing(self, mails: tuple[Mails, str]) -> None:
         before = len(mails[0].mails)
         answer = mail(mails[1])
         assert not answer.delivered
-        assert "STARTTLS" in answer.text
+        assert "offers no STARTTLS: INBAND_MAIL_SECURITY" in answer.text
         assert len(mails[0].mails) == before
 
     def test_its_certificate_has_to_be_known(self, tmp_path: Path) -> None:
@@ -681,6 +711,7 @@ class TestEncryption:
             assert mail(server, ca_file=pem, mail_user="anna", mail_password=password).delivered
             refused = mail(server, ca_file=pem, mail_user="anna", mail_password=f"not {password}")
             assert refused.text.startswith("535 ")
+            assert "INBAND_MAIL_PASSWORD" in refused.text
         assert len(sink.mails) == 1
 
     def test_without_a_mail_server_it_says_what_to_set(self) -> None:
