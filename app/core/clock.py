@@ -2,7 +2,10 @@
 
 What a network kept back comes in a bunch, each reading less late than the one before; what a file holds lies as far back as it lies.
 A clock that is wrong is wrong by the same, whatever the pace of the machine. So does a buffer that each part goes through at an even pace:
-when a part was *cut* may lie as long before, truly, and only when it was *measured* may not. Times are s.
+when a part was *cut* may lie as long before, truly, and only when it was *measured* may not.
+
+One reading says it for certain that names a correction which was issued after its part was cut, by the clock in question: no buffer
+makes that true. Either the clock is behind or the number is not that of the part. Times are s.
 """
 
 from collections.abc import Sequence
@@ -12,6 +15,7 @@ FEWEST = 5  # readings in a row
 LEAST = 900.0
 EVEN = 60.0  # by how much two of them may differ: clocks that tell the minute
 SPAN = 4.0  # times that, and longer, they take to arrive: one by one
+DIFFER = 60.0  # by how much two clocks may differ that are right
 
 
 def constant_lag(received: Sequence[float], stated: Sequence[float]) -> float | None:
@@ -32,3 +36,13 @@ def constant_lag(received: Sequence[float], stated: Sequence[float]) -> float | 
     if lags[0] < LEAST or uneven > min(EVEN, took / SPAN) or took <= 0:
         return None
     return lags[FEWEST // 2]
+
+
+def behind_by(stated: float, not_before: float) -> float | None:
+    """By how much, at least, a clock is behind that states this time for what cannot have been earlier; None where it may be right.
+
+    >>> behind_by(-7200, not_before=0), behind_by(-59, not_before=0)
+    (7200, None)
+    """
+    least = not_before - stated
+    return least if least > DIFFER else None

@@ -92,6 +92,11 @@ def _behind(alarm: Alarm) -> str:
         "In each of the newest {n} readings of {characteristic} measured_at lies {lag} before its receipt: the clock of the machine is "
         "behind, or each reading waits as long on its way."
     )
+    if data.get("number") is not None:
+        text = _(
+            "A reading of {characteristic} names correction {number}, which was issued {lag} after its part was cut by machined_at: the "
+            "clock of the machine is behind by as much or more, or the number is not that of the part."
+        )
     counted = _(
         "Parts count as cut without corrections that tool {tool} had. Nothing is corrected through it until this alarm is answered."
     )
@@ -103,6 +108,7 @@ def _behind(alarm: Alarm) -> str:
         characteristic=data.get("characteristic"),
         lag=age(data.get("lag") or 0.0),
         n=data.get("readings"),
+        number=data.get("number"),
         tool=alarm.tool_memory,
     )
 

@@ -71,7 +71,8 @@ DATA: dict[str, list[dict[str, Any]]] = {
     + [
         {"characteristic": "seat", "by": "clock", "before": before, "lag": 7200.0, "readings": 5}
         for before in (False, True)
-    ],
+    ]
+    + [{"characteristic": "seat", "by": "clock", "before": True, "lag": 7200.0, "number": 17}],
     "correction_in_doubt": [
         {"characteristic": "seat", "number": 17, "of_tool": 7} | more
         for more in (

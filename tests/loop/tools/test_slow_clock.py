@@ -26,13 +26,13 @@ HOURS = timedelta(hours=1)
 class Machine:
     """A lathe that cuts a part a minute, and applies a correction before the next; wear 0.5 µm a part, scatter 0.3 µm.
 
-    tells: the times that it sends, by a clock that is behind. buffer: parts between cut and receipt. step: of the size.
-    gauge: how long before its receipt a part is measured.
+    tells: the times that it sends, by a clock that is behind. numbers: it sends that of the last correction, too. buffer: parts between
+    cut and receipt. step: of the size. gauge: how long before its receipt a part is measured.
     """
 
     def __init__(self, tells: tuple[str, ...], behind: timedelta = HOURS * 0, k: int = 2, seed: int = 0) -> None:
         self.tells, self.behind, self.buffer, self.step, self.wear = tells, behind, 0, 0.0, 0.5
-        self.gauge = timedelta()
+        self.gauge, self.numbers, self.number, self.in_effect, self.new_at = timedelta(), False, 0, list[int](), 0
         self.at, self.chance, self.offset = datetime(2026, 3, 2, 6, tzinfo=UTC), np.random.default_rng(seed), 0.0
         self.sizes, self.cuts, self.actions, self.alarms = list[float](), list[datetime](), list[str](), list[Any]()
         self.entry, self.snapshot = Entry(1, "lathe", 1, "seat"), Snapshot(last_correction={1: 0}, versions={1: 0})
@@ -44,18 +44,19 @@ class Machine:
     def part(self) -> None:
         """Cut a part, and measure the one that comes out of the buffer."""
         self.at += timedelta(minutes=1)
-        self.sizes.append(
-            self.wear * len(self.sizes) + self.step + self.offset * 1000 + float(self.chance.normal(0, 0.3))
-        )
+        worn = self.wear * (len(self.sizes) - self.new_at)
+        self.sizes.append(worn + self.step + self.offset * 1000 + float(self.chance.normal(0, 0.3)))
         self.cuts.append(self.at)
+        self.in_effect.append(self.number)
         if len(self.sizes) > self.buffer:
             place = len(self.sizes) - 1 - self.buffer
-            self.read(self.sizes[place], self.cuts[place])
+            self.read(self.sizes[place], self.cuts[place], self.in_effect[place])
 
-    def read(self, size: float, cut: datetime) -> None:
+    def read(self, size: float, cut: datetime, in_effect: int = 0) -> None:
         """Send a reading, and apply what is asked for before the next part."""
         times = {"machined_at": cut, "measured_at": self.at - self.gauge}
-        verdict = self.decide(size, **{name: times[name] - self.behind for name in self.tells})
+        said: dict[str, Any] = {name: times[name] - self.behind for name in self.tells}
+        verdict = self.decide(size, **said | ({"correction_in_effect": in_effect} if self.numbers else {}))
         if verdict.correction is not None and verdict.correction.status == "pending":
             self.apply(verdict.correction)
 
@@ -74,7 +75,7 @@ class Machine:
 
     def apply(self, correction: PendingCorrection) -> None:
         """Confirm it, some seconds later."""
-        self.offset = round(self.offset + correction.amount, 9)
+        self.offset, self.number = round(self.offset + correction.amount, 9), correction.number
         tool = self.snapshot.tools[TOOL]
         at = self.at + timedelta(seconds=5)
         self.snapshot.tools[TOOL] = structs.replace(
@@ -86,6 +87,14 @@ class Machine:
                 for c in tool.corrections
             ],
         )
+
+    def change_tool(self) -> None:
+        """Put a new tool in, and say so."""
+        self.offset, self.new_at = 0.0, len(self.sizes)
+        tool, stream = self.snapshot.tools[TOOL], self.snapshot.streams[1]
+        self.snapshot.tools[TOOL] = structs.replace(tool, offset=0.0, total=0.0, reset_at=self.at)
+        self.snapshot.streams[1] = structs.replace(stream, gain_from=stream.sequence)
+        self.snapshot.averages[AVERAGE] = LoadedAverage(*AVERAGE)
 
     @property
     def out(self) -> int:
@@ -221,3 +230,34 @@ def test_history_that_is_sent_as_readings_pauses_nothing() -> None:
         machine.behind = HOURS * 3 - timedelta(minutes=minute)
         machine.read(0.3 * minute, machine.at)
     assert machine.alarms == []
+
+
+@pytest.mark.parametrize("hours", [0.5, 3])
+def test_a_tool_that_was_changed_is_no_guess_where_numbers_show_the_clock(hours: float) -> None:
+    """All parts of the new tool count as cut before, and nothing would be corrected until the clock has caught up, or be said of why."""
+    for seed in range(6):
+        machine = Machine(CUT, HOURS * hours, 1 + seed % 3, seed)
+        machine.numbers = True
+        machine.run(25)
+        assert (machine.alarms, machine.out) == ([], 0), "the number wins"
+        machine.change_tool()
+        machine.run(60)
+        [alarm] = machine.alarms
+        assert (alarm.data["by"], alarm.data["before"], alarm.sequence) == ("clock", True, 26)
+        assert alarm.data["lag"] <= machine.behind.total_seconds()
+        assert machine.actions[-1] == "stop"
+        assert machine.out == 1
+
+
+@pytest.mark.parametrize("tells", [CUT, BOTH])
+@pytest.mark.parametrize("buffer", [0, 1, 12, 40])
+def test_numbers_of_parts_on_the_way_show_no_clock(tells: tuple[str, ...], buffer: int) -> None:
+    for seed in range(6):
+        machine = Machine(tells, k=1 + seed % 3, seed=seed)
+        machine.numbers, machine.buffer, machine.wear = True, buffer, 0.1
+        machine.run(50)
+        machine.change_tool()
+        machine.run(60)
+        assert [alarm for alarm in machine.alarms if alarm.data.get("number")] == []
+        assert "correct" in machine.actions[-60 + buffer :]
+        assert "stop" not in machine.actions

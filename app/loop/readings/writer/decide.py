@@ -100,7 +100,7 @@ def decide_reading(pending: PendingWrites, entry: Entry, reading: ReadingIn, now
     course, jump = _course(stream, deviation, compensated)
     paused_by = stream.paused_by if tool is None or stream.paused_by is not None else tool.paused_by
     timed = time_decides(stream, reading, compensated, previous_tool=previous_tool)
-    lag = lag_with(stream, Arrival(sequence, now, measured_at), timed=timed)
+    lag = lag_with(pending, stream, reading, Arrival(sequence, now, measured_at), timed=timed)
     total = issued_total(pending, tool) if parameters.max_total is not None else 0.0
 
     def judged(*, paused: bool) -> Decision:

@@ -5,21 +5,29 @@ raised once: after its answer the machine may go on naming that number until it 
 """
 
 from collections.abc import Iterable, Iterator
-from datetime import timedelta
 from typing import Any
 
+from app.core.clock import behind_by
 from app.loop.readings.schemas import ReadingIn
 from app.loop.readings.writer.pending import PendingAlarm, PendingStream, PendingTool, PendingWrites
 from app.loop.tables.tools import DOUBT
 
 LET_GO = ("pending", "applied")
-BEHIND = timedelta(minutes=1)  # that clocks of a machine and of the server may differ
 
 
 def fell(pending: PendingWrites, tool: PendingTool | None, number: int | None) -> bool:
     """Tell if no machine should have applied the correction that a reading names: it waits for a person, or has fallen."""
     named = None if tool is None or number is None else pending.named_correction(tool.machine_id, number)
     return named is not None and named.status is not None and named.status not in LET_GO
+
+
+def cut_before_issue(pending: PendingWrites, tool: PendingTool | None, reading: ReadingIn) -> float | None:
+    """By how much at least the part was cut, as it says, before the correction was issued that it names, s; None where it may be so."""
+    number, cut = reading.correction_in_effect, reading.machined_at
+    named = None if tool is None or number is None else pending.named_correction(tool.machine_id, number)
+    if named is None or named.issued_at is None or cut is None:
+        return None
+    return behind_by(cut.timestamp(), named.issued_at.timestamp())
 
 
 def doubt(pending: PendingWrites, stream: PendingStream, reading: ReadingIn, sequence: int) -> PendingAlarm | None:
@@ -31,11 +39,7 @@ def doubt(pending: PendingWrites, stream: PendingStream, reading: ReadingIn, seq
     data: dict[str, Any] = {"characteristic": stream.entry.characteristic, "number": number}
     if fell(pending, tool, number):
         data |= {"why": "fell", "status": named.status}
-    elif (
-        reading.machined_at is not None
-        and named.issued_at is not None
-        and reading.machined_at < named.issued_at - BEHIND
-    ):
+    elif cut_before_issue(pending, tool, reading) is not None and reading.machined_at and named.issued_at:
         data |= {
             "why": "not_issued",
             "machined_at": reading.machined_at.isoformat(),

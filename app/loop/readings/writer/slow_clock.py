@@ -3,16 +3,19 @@
 `app.core.early` finds it in the sizes, if they show it: a loop that averages follows wear by half, and they do not. The times show it
 before a part is out. The time of *measurement* lies as long before its receipt in every reading for hardly another reason: the tool is
 paused with the next correction. A part may be *on its way* to the gauge as long: where `machined_at` alone is sent, sizes have to show it.
+Where the number of a correction is sent too, time decides nothing but if the part was cut before the tool was changed; there one reading
+shows it that names a correction which was issued after its part was cut.
 """
 
 from collections.abc import Sequence
 from datetime import datetime
-from typing import Any
+from typing import Any, NamedTuple
 
-from app.core.clock import FEWEST, constant_lag
+from app.core.clock import FEWEST, LEAST, constant_lag
 from app.core.decision.decide import Decision, ReadingAlarm
 from app.core.decision.limits import nanometres
 from app.loop.readings.schemas import ReadingIn
+from app.loop.readings.writer.doubts import cut_before_issue
 from app.loop.readings.writer.opposed import paused
 from app.loop.readings.writer.pending import PendingAlarm, PendingStream, PendingWrites
 from app.loop.readings.writer.snapshot import Arrival
@@ -32,8 +35,17 @@ def time_decides(stream: PendingStream, reading: ReadingIn, compensated: float |
     return nanometres(tool.total) != nanometres(compensated)
 
 
-def lag_with(stream: PendingStream, arrival: Arrival, *, timed: bool) -> float | None:
-    """Keep when the reading that is decided now came in; by how much the newest say they were measured before that, s, if it matters.
+class Lag(NamedTuple):
+    """By how much a clock is behind, s. number: of the correction that shows it; None: the newest readings do."""
+
+    seconds: float
+    number: int | None = None
+
+
+def lag_with(
+    pending: PendingWrites, stream: PendingStream, reading: ReadingIn, arrival: Arrival, *, timed: bool
+) -> Lag | None:
+    """Keep when the reading that is decided now came in; by how much its clock is behind, if it is, and if that matters.
 
     timed: it does, by `time_decides`.
     """
@@ -41,19 +53,24 @@ def lag_with(stream: PendingStream, arrival: Arrival, *, timed: bool) -> float |
         stream.arrivals.append(arrival)
     if not timed:
         return None
+    certain = cut_before_issue(pending, stream.tool, reading)
+    if certain is not None:
+        return Lag(certain, reading.correction_in_effect)
     newest = [each for each in stream.arrivals[-FEWEST:] if each.sequence > stream.start.gain_from]
     received, stated = ([getattr(each, name).timestamp() for each in newest] for name in ("received_at", "measured_at"))
-    return constant_lag(received, stated)
+    lag = constant_lag(received, stated)
+    return None if lag is None else Lag(lag)
 
 
 def behind(
-    pending: PendingWrites, stream: PendingStream, decision: Decision, lag: float | None, *, previous_tool: bool
+    pending: PendingWrites, stream: PendingStream, decision: Decision, lag: Lag | None, *, previous_tool: bool
 ) -> PendingAlarm | None:
     """Pause the tool if the clock is behind (`lag_with`), by which alone it is known what the part was cut without; the alarm."""
     tool = stream.tool
-    if tool is None or lag is None or not (previous_tool or decision.amount is not None):
+    if tool is None or lag is None or lag.seconds < LEAST or not (previous_tool or decision.amount is not None):
         return None
-    said: dict[str, Any] = {"by": "clock", "before": previous_tool, "readings": FEWEST, "lag": round(lag, 1)}
+    said: dict[str, Any] = {"by": "clock", "before": previous_tool, "lag": round(lag.seconds, 1)}
+    said |= {"readings": FEWEST} if lag.number is None else {"number": lag.number}
     return paused(pending, stream, tool, decision.deviation, EARLY, said)
 
 
