@@ -11,7 +11,7 @@ import hashlib
 import io
 import json
 from collections import Counter
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from math import isfinite
@@ -50,7 +50,16 @@ from app.files.formats.cell_values import Slashed, Unreadable, same_number, slas
 from app.files.formats.file_times import times_of
 from app.files.formats.headings import is_summary
 from app.files.formats.repeats import Remark, Repeats
-from app.files.formats.units import LENGTHS, UnknownUnit, beside, in_celsius, length_unit, unit_in, unit_of_name
+from app.files.formats.units import (
+    LENGTHS,
+    UnknownUnit,
+    beside,
+    in_celsius,
+    length_unit,
+    unit_behind,
+    unit_in,
+    unit_of_name,
+)
 
 NAMES: Final = {"csv": "*.csv", "xlsx": "*.xls[xm]", "ndjson": "*.ndjson", "text": "*.txt", "aqdef": "*.df[qdxQDX]"}
 NOT_ALONE: Final = 2  # files of a pair
@@ -148,7 +157,9 @@ class _Reader:
         self.path = next((path for path in paths if path.suffix.lower() != ".dfd"), paths[0])
         self.scale = INCH if machine.unit == "inch" else 1.0
         self.zone = None if settings.zone is None else zone_named(settings.zone)
-        self.form = Form(self.scale, settings.decimal, settings.times, self.zone, sheet=settings.format == "xlsx")
+        self.form = Form(
+            self.scale, settings.decimal or ".", settings.times, self.zone, sheet=settings.format == "xlsx"
+        )
         self.encoding = settings.encoding or (
             aqdef.encoding_of(self.path) if settings.format == "aqdef" else delimited.encoding_of(self.path)
         )
@@ -233,10 +244,14 @@ class _Reader:
                 if "measured" in fields
                 else [name for name in self.machine.characteristics if name in row]
             )
+            new = [column for column in sizes if column not in units]
             try:
-                units |= {column: self.settings.unit or unit(column) for column in sizes if column not in units}
+                units |= {column: self.settings.unit or unit(column) for column in new}
             except UnknownUnit as error:
                 self._fault(line, error.word, unit_in_doubt(error.word))
+                return
+            if doubt := next(filter(None, (self._thousands(table, each, units[each]) for each in new)), ""):
+                self._fault(line, "", f"{doubt}.")
                 return
             if "measured" in fields:
                 name = str(fields.get("characteristic", EVERY)).strip()
@@ -252,6 +267,21 @@ class _Reader:
             for name in sizes:
                 if row[name] not in {None, ""} and str(row[name]).strip():
                     self._take(line, name, fields | {"measured": row[name]}, row, units[name])
+
+    def _thousands(self, table: Sequence[tuple[int, Found]], column: str, unit: str | None) -> str:
+        """The question about a column of sizes in a small unit whose sign may part thousands; empty where nothing is in doubt."""
+        if self.settings.decimal is not None or self.settings.format != "csv":
+            return ""
+        rows = [row for _line, row in table if isinstance(row, Mapping)]
+        cells = [unit_behind(str(cell_of(row, column) or "")) for row in rows]
+        said = {
+            unit,
+            *(length_unit(str(beside(row, "unit") or "")) for row in rows),
+            *(length_unit(each) for _, each in cells),
+        }
+        small = next((each for each in said if each is not None and LENGTHS[each] < 1), None)
+        number = delimited.like_thousands(text for text, _unit in cells) if small else ""
+        return delimited.thousands_in_doubt(number, str(small)) if number else ""
 
     def _statistics(self, line: int, label: str) -> None:
         """A row of limits or statistics, which is no part."""

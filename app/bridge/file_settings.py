@@ -22,7 +22,7 @@ class Settings(Struct, forbid_unknown_fields=True, frozen=True):
     columns: column (or name in NDJSON) by field of `FIELDS`, two as ``Date+Time``; if empty, each is named as its field. Without ``measured`` the
     names in ``characteristics`` are columns of sizes. lines: regular expressions with fields as named groups; one without
     ``measured`` holds for the lines below. decimal, delimiter, encoding: of the text; the last two are found out if they are
-    left out. sheet: of a workbook; the first with cells if it is left out. times: the form of times, as strptime has it. zone: of times without an offset. day_first: in dates
+    left out, decimals have a point. sheet: of a workbook; the first with cells if it is left out. times: the form of times, as strptime has it. zone: of times without an offset. day_first: in dates
     with strokes, AQDEF only. missing: marks in place of a size that was not measured. others: readings of a characteristic that has no name in ``characteristics`` make the file fail,
     or are passed over. statistics: rows of limits or statistics do the same. unit: of sizes whose row and cell name none, whatever
     names of columns and lines above them say. decisions: an absolute path, of a file that says `stop` or `hold`; anyone who acts on it removes it.
@@ -39,7 +39,7 @@ class Settings(Struct, forbid_unknown_fields=True, frozen=True):
     largest: Positive = 20.0
     columns: dict[str, str] = {}
     lines: tuple[str, ...] = ()
-    decimal: Literal[".", ","] = "."
+    decimal: Literal[".", ","] | None = None
     delimiter: str | None = None
     encoding: str | None = None
     sheet: str | None = None

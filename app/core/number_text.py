@@ -27,6 +27,8 @@ class NumberFault(StrEnum):
     THOUSANDS = "thousands"
     DECIMAL = "decimal"  # the other decimal sign than the one that was said
     TOO_LARGE = "too_large"
+    BRACKETS = "brackets"  # a reference dimension, or below 0
+    BOUND = "bound"  # below or above what the gauge shows
     NOT_A_NUMBER = "not_a_number"
 
 
@@ -97,7 +99,17 @@ def has_broken_number(row: str) -> bool:
     return _BROKEN.search(plain(row)) is not None
 
 
+_IN_BRACKETS = re.compile(r"\([^()]*\d[^()]*\)|\[[^\[\]]*\d[^\[\]]*\]")
+_BOUND = re.compile(r"(?:[<>]=?|[≤≥])\s*[+-]?[\d.,]+", re.ASCII)
+
+
 def _fault(given: str) -> NumberFault:
+    if len(given) > LONGEST:
+        return NumberFault.NOT_A_NUMBER
+    if _IN_BRACKETS.fullmatch(given):
+        return NumberFault.BRACKETS
+    if _BOUND.fullmatch(given):
+        return NumberFault.BOUND
     if not _ONLY_NUMBER.fullmatch(given) or not any(character.isdigit() for character in given):
         return NumberFault.NOT_A_NUMBER
     if _BLANK_INSIDE.search(given):

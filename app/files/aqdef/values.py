@@ -10,12 +10,12 @@ from collections.abc import Iterator
 from datetime import datetime
 from typing import NamedTuple
 
-from app.core.number_text import NotANumber, read_number
+from app.core.number_text import NotANumber, NumberFault, read_number
 from app.files.aqdef import description as aqdef
 from app.files.aqdef.description import LINE, Description, Source, encoding_of, open_text
 from app.files.aqdef.fields import FIELDS, OF_VALUES, ROW
 from app.files.aqdef.times import time_of
-from app.files.formats.cell_values import DayOrder, Unreadable
+from app.files.formats.cell_values import DayOrder, Unreadable, no_number
 from app.files.formats.delimited import Unusable
 from app.files.formats.repeats import Remark
 from app.language.i18n import _
@@ -354,8 +354,10 @@ def number_of(text: str) -> float:
     """
     try:
         return read_number(text)
-    except NotANumber:
+    except NotANumber as error:
         reason = _("is empty") if not text.strip() else _("is not a number")
+        if error.fault in {NumberFault.BRACKETS, NumberFault.BOUND}:
+            reason = no_number(error.fault, ".")
         raise Unreadable(reason) from None
 
 

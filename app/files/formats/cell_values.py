@@ -115,7 +115,7 @@ def number(text: str, decimal: str) -> float:
     try:
         return read_number(text, decimal)
     except NotANumber as error:
-        raise Unreadable(_no_number(error.fault, decimal)) from None
+        raise Unreadable(no_number(error.fault, decimal)) from None
 
 
 def same_number(one: str, other: str) -> bool:
@@ -132,7 +132,7 @@ def same_number(one: str, other: str) -> bool:
         return False
 
 
-def _no_number(fault: NumberFault, decimal: str) -> str:
+def no_number(fault: NumberFault, decimal: str) -> str:
     """Explain why a cell is no number, and what to do."""
     other = "." if decimal == "," else ","
     return {
@@ -145,6 +145,14 @@ def _no_number(fault: NumberFault, decimal: str) -> str:
         ),
         NumberFault.BLANK: _("has a blank inside; write it without, what was there is unknown"),
         NumberFault.TOO_LARGE: _("is too large to be a number of this world"),
+        NumberFault.BRACKETS: _(
+            "is in brackets: a reference dimension, or a size below 0 as accountants write it? Write it without brackets and "
+            "with its sign, or remove the line"
+        ),
+        NumberFault.BOUND: _(
+            "is a bound, no size: it is beyond what the gauge shows; remove the line, or name it as a mark of a missing value "
+            "(--missing, in a bridge missing)"
+        ),
         NumberFault.NOT_A_NUMBER: _("is not a number; write it like 39{decimal}9981, without a unit").format(
             decimal=decimal
         ),

@@ -308,6 +308,30 @@ def decimal_of(cells: Iterable[str]) -> str:
     return "," if commas > points else "."
 
 
+_LIKE_THOUSANDS = re.compile(r"[+\-\N{MINUS SIGN}]?[1-9]\d{0,2}[.,]\d{3}")
+
+
+def like_thousands(cells: Iterable[str]) -> str:
+    """The first number in which a sign may part thousands, where none of the others tells; empty if there is none.
+
+    >>> like_thousands(["980", "1.250"]), like_thousands(["1.250", "0.980"]), like_thousands(["1.25"])
+    ('1.250', '', '')
+    """
+    signed = [cell.strip() for cell in cells if "." in cell or "," in cell]
+    numbers = [cell for cell in signed if _is_number(cell)]
+    return numbers[0] if numbers and all(map(_LIKE_THOUSANDS.fullmatch, numbers)) else ""
+
+
+def thousands_in_doubt(number: str, unit: str) -> str:
+    """The question about such a number in a unit in which either may be meant."""
+    words = _(
+        "{number} {unit} may be {small} or {large}: say how decimals are written (--decimal, in a bridge decimal); separators of "
+        "thousands have to be removed"
+    )
+    whole, part = re.split("[.,]", number)
+    return words.format(number=number, unit=unit, small=f"{whole}.{part}", large=f"{whole}{part}")
+
+
 def defused(text: str) -> str:
     """A text cell that no spreadsheet takes for a formula.
 

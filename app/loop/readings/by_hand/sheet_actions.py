@@ -221,6 +221,10 @@ def fault_words(fault: NumberFault) -> str:
     """The reason why what was typed is no size."""
     if fault is NumberFault.THOUSANDS:
         return _("write it without a separator of thousands")
+    if fault is NumberFault.BRACKETS:
+        return _("write it without brackets, with its sign if it is below 0")
+    if fault is NumberFault.BOUND:
+        return _("this is a bound, no size; measure it with a gauge that shows it")
     return _("this is not a size; write it like 39.998, in mm")
 
 

@@ -15,7 +15,7 @@ from app.files.formats.cell_values import slashed
 from app.files.formats.delimited import Row, Unusable
 from app.files.formats.file_times import FileTimes, times_of
 from app.files.formats.headings import TOP, as_wide, heading, is_summary, others
-from app.files.formats.units import LENGTHS, UnknownUnit, unit_above, unit_behind, unit_in
+from app.files.formats.units import LENGTHS, UnknownUnit, length_unit, unit_above, unit_behind, unit_in
 from app.language.i18n import _
 from app.loop.readings.importing.columns import DRAWN, columns_of, fits, guesses_of, nominal_of
 
@@ -70,6 +70,7 @@ class Layout:
         str | None, ...
     ] = ()  # of columns whose header says none: in a row below it, or in the lines above the table
     doubt: str = ""  # a unit that the lines above the table name, and do not say of what
+    thousands: Mapping[int, str] = field(default_factory=dict)  # a number whose sign may part thousands, by its column
     nominal: tuple[int, ...] = ()  # of the nominal size, which is one for all rows of a characteristic
     zone: ZoneInfo | None = None
     time_format: str | None = None
@@ -121,6 +122,11 @@ class Layout:
             words = _("The lines above the table name the unit {unit}, and nobody can tell of which numbers.")
             what = _("Say in which unit the numbers of the table are: {units}.").format(units=", ".join(LENGTHS))
             raise wrong("unit", f"{words.format(unit=self.doubt)} {what}")
+
+    def refuse_thousands(self, place: int, unit: str | None) -> None:
+        """Refuse numbers of a small unit that may be a thousand times as large: 1.250 µm of a German file. Raises `Invalid`."""
+        if place in self.thousands and LENGTHS[unit or "mm"] < 1:
+            raise wrong("decimal", delimited.thousands_in_doubt(self.thousands[place], unit or "mm"))
 
     def of_one(self, key: str, name: str) -> "Layout":
         """The layout for one characteristic: of a table with rows of several, its own rows. Raises `Invalid`."""
@@ -279,6 +285,7 @@ def _csv_layout(path: Path, wishes: Wishes, zone: ZoneInfo | None, kind: str = "
         said_unit=(unit_of(header[place], wishes.unit) or units[place]) if "measured" in columns else wishes.unit,
         units=units,
         doubt="" if wishes.unit or "unit" in columns else doubt,
+        thousands={} if wishes.decimal or kind == "sheet" else _thousands(below, range(len(header))[only]),
         nominal=nominal_of(header, columns, wishes.mapping),
         zone=zone,
         time_format=wishes.time_format,
@@ -288,12 +295,32 @@ def _csv_layout(path: Path, wishes: Wishes, zone: ZoneInfo | None, kind: str = "
         missing=wishes.missing,
         parts=() if "measured" in columns else parts_across.columns(header, guesses_of(header), below),
     )
-    if "measured" in columns and made.said_unit is None:
-        made.refuse_doubt()
+    if "measured" in columns:
+        for unit in _units_of(made, below):
+            made.refuse_thousands(place, unit)
+        if made.said_unit is None:
+            made.refuse_doubt()
     named = (
         (row.line, row.cells) for row in rows_of(path, made) if isinstance(row, Row) and tuple(row.cells) != header
     )
     return replace(_timed(made, _times(made, below, rows)), drawn=_drawn(made, named))
+
+
+def _thousands(rows: Sequence[Row], places: Iterable[int]) -> dict[int, str]:
+    """A number in which a sign may part thousands for each of these columns where no number tells."""
+    found = {
+        place: delimited.like_thousands(unit_behind(text_of(row, (place,)))[0] for row in rows) for place in places
+    }
+    return {place: number for place, number in found.items() if number}
+
+
+def _units_of(layout: Layout, rows: Sequence[Row]) -> set[str | None]:
+    """The units of the measured sizes of these rows, as far as they are known."""
+    units = {layout.said_unit}
+    for row in rows:
+        said = (text_of(row, layout.columns.get("unit", ())), unit_behind(text_of(row, layout.columns["measured"]))[1])
+        units |= {length_unit(word) for word in said if word}
+    return units
 
 
 def _refuse_no_table(begin: str) -> None:

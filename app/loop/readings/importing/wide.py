@@ -72,6 +72,7 @@ def layout_of(layout: Layout, column: Column, unit: str | None) -> Layout:
     own_unit = unit_of(layout.header[column.place], unit) or (layout.units[column.place] if layout.units else None)
     if own_unit is None:
         layout.refuse_doubt()
+    layout.refuse_thousands(column.place, own_unit)
     return replace(layout, columns=fields | {"measured": (column.place,)}, said_unit=own_unit, skips_blank=True)
 
 

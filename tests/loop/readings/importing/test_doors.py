@@ -49,6 +49,7 @@ LENGTHS = {
     "0.1": D40 | {"target": 0.1, "tolerance_width": 0.2, "confidence_limit": 1.0},
     "16": D40 | {"target": 16.0},
     "2.167": D40 | {"target": 2.167},
+    "1.25": D40 | {"target": 1.25},
     "0": D40 | {"target": 0.0},
     "1.016": D40 | {"target": 1.016},
 }
@@ -113,6 +114,7 @@ Date: 2025-03-15
    10.001   -15.202   2.169   2.167
 """
 UNIT = "Time;Run-out [{}]\n18.11.2025 06:05;0,10\n18.11.2025 06:06;0,12\n18.11.2025 06:07;0,08\n"
+THOUSANDS = "Time;D40 [µm]\n18.11.2025 06:05;1.250\n18.11.2025 06:06;1.251\n"
 US = "Date,Time,Measured\n11/18/2025,6:05:10 AM,40.001\n11/18/2025,6:06:10 PM,40.002\n"
 GERMAN = "Nr.;Datum;Uhrzeit;Sollmaß;Istmaß\n1;18.11.25;06:05:11;40,000;40,001\n2;18.11.25;06:06:12;40,000;39,998\n"
 TABLES = {
@@ -183,6 +185,34 @@ TABLES = {
         '"Time","Value"\n"2025-11-18 06:05:00","40,001"\n"2025-11-18 06:06:00","40,002"\n', morning(40.001, 40.002)
     ),
     "thousands": Case("Time;Value\n18.11.2025 06:05;1.040,001\n", bad=(2,), words="thousands"),
+    "thousands or decimals": Case(
+        THOUSANDS,
+        size="1.25",
+        column="D40 [µm]",
+        whole=True,
+        words="1.250 um may be 1.250 or 1250",
+        bridge={"decimal": None},
+    ),
+    "decimals that are said": Case(
+        THOUSANDS,
+        morning(0.00125, 0.001251),
+        size="0",
+        column="D40 [µm]",
+        cli={"decimal": "."},
+        page={"decimal": "point"},
+        bridge={"decimal": "."},
+    ),
+    "decimals that tell": Case(
+        THOUSANDS + "18.11.2025 06:07;0.980\n",
+        morning(0.00125, 0.001251, 0.00098),
+        size="0",
+        column="D40 [µm]",
+        bridge={"decimal": None},
+    ),
+    "brackets": Case(
+        "Time;D40\n18.11.2025 06:05;(40,003)\n", bad=(2,), words="a reference dimension, or a size below 0"
+    ),
+    "a bound": Case("Time;D40\n18.11.2025 06:05;<0,001\n", bad=(2,), words="it is beyond what the gauge shows"),
     "minus sign": Case(
         "Time;Deviation\n18.11.2025 06:05;\N{MINUS SIGN}0,003\n18.11.2025 06:06;+0,002\n",
         morning(-0.003, 0.002),
@@ -352,7 +382,13 @@ EVERY_DOOR = {
     *("footer that is left out", "footer", "unit beside the size", "a torque in the header", "title in inches"),
     *("title of some unit", "in that may be inches", "a unit that is in doubt and named", "microinches", "utf-16"),
     *("two digits of a year", "inches far from the target", "days of a spreadsheet", "two features of one name"),
-    *("an hour that was twice", "seconds that are named", "workbook", "workbook with a footer"),
+    *(
+        "thousands or decimals",
+        "an hour that was twice",
+        "seconds that are named",
+        "workbook",
+        "workbook with a footer",
+    ),
     *("workbook with a formula", "workbook that is none"),
 }
 """One table of each kind: what is said beside the file, or asked, at each door. The others are the same file to all: in the short
@@ -507,7 +543,7 @@ def test_a_table_means_the_same_at_every_door(plant: Plant, tmp_path: Path, name
     columns = {"measured": column} | ({"measured_at": at} if at else {})
     decimal = "." if re.search(r"(?m)(^|[;,\t ])-?\d+\.\d{3,}\b", case.text) else ","
     form = {"format": "xlsx"} if name in BOOKS else {"decimal": decimal}
-    readings, faults, words = bridged(path, {"*": "x"}, columns=columns, **form, **case.bridge)
+    readings, faults, words = bridged(path, {"*": "x"}, columns=columns, **(form | case.bridge))
     assert refused or as_expected(readings, case)
     if case.far:
         entries = [
