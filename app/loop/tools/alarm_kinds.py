@@ -160,6 +160,12 @@ EARLY_EFFECT = register(
 
 def _in_doubt(alarm: Alarm) -> str:
     data = alarm.data
+    if data["why"] == "clock":
+        return _(
+            "In each of the newest {n} readings of {characteristic} machined_at lies {lag} before its receipt: corrections that were "
+            "applied since then count as missing from the parts. That is right if each part is as long on its way to the gauge. If the "
+            "clock of the machine is behind, they are taken back, or follow the wear by half."
+        ).format(characteristic=data.get("characteristic"), lag=age(data.get("lag") or 0.0), n=data.get("readings"))
     if data["why"] == "fell":
         fell = {
             "held": _("it is held"),
@@ -184,14 +190,15 @@ CORRECTION_IN_DOUBT = register(
         word=lambda: _("Correction in doubt"),
         sentence=_in_doubt,
         what_to_do=lambda: _(
-            "Look at what the machine sends as correction_in_effect, and at its clock. Read the offset at the control; if it differs, "
-            "enter it under Tools."
+            "Look at what the machine sends as correction_in_effect, and at its clock: measured_at beside machined_at shows if it is behind. "
+            "Read the offset at the control; if it differs, enter it under Tools."
         ),
         icon="waiting",
         comments={
             "noted": lambda: [
                 _("Program that sends the number corrected"),
                 _("Clock set"),
+                _("Parts are that long on their way"),
                 _("Offset at the control is right"),
             ]
         },

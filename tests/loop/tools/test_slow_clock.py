@@ -13,6 +13,7 @@ from app.loop.readings.records import Entry
 from app.loop.readings.schemas import ReadingIn
 from app.loop.readings.writer.columnar import decide_in_columns
 from app.loop.readings.writer.decide import decide_one_by_one, decide_reading
+from app.loop.readings.writer.doubts import leave_out_answered
 from app.loop.readings.writer.pending import PendingCorrection, PendingWrites, Verdict
 from app.loop.readings.writer.snapshot import LoadedAverage, LoadedStream, LoadedTool, Snapshot
 from tests.shop import PARAMETERS
@@ -34,6 +35,7 @@ class Machine:
         self.tells, self.behind, self.buffer, self.step, self.wear = tells, behind, 0, 0.0, 0.5
         self.gauge, self.numbers, self.number, self.in_effect, self.new_at = timedelta(), False, 0, list[int](), 0
         self.at, self.chance, self.offset = datetime(2026, 3, 2, 6, tzinfo=UTC), np.random.default_rng(seed), 0.0
+        self.questions: list[Any] = []
         self.sizes, self.cuts, self.actions, self.alarms = list[float](), list[datetime](), list[str](), list[Any]()
         self.entry, self.snapshot = Entry(1, "lathe", 1, "seat"), Snapshot(last_correction={1: 0}, versions={1: 0})
         self.snapshot.parameters[1] = Parameters(**PARAMETERS | {"weighting_factor": k})
@@ -69,6 +71,7 @@ class Machine:
         for number, alarm in enumerate(pending.raised, 1):
             alarm.id = number
         self.alarms += [alarm for alarm in pending.raised if alarm.kind == "early_effect"]
+        self.questions += [alarm for alarm in pending.raised if alarm.data.get("why") == "clock"]
         pending.settle()
         self.actions.append(verdict.decision.action.value)
         return verdict
@@ -261,3 +264,39 @@ def test_numbers_of_parts_on_the_way_show_no_clock(tells: tuple[str, ...], buffe
         assert [alarm for alarm in machine.alarms if alarm.data.get("number")] == []
         assert "correct" in machine.actions[-60 + buffer :]
         assert "stop" not in machine.actions
+
+
+@pytest.mark.parametrize("k", [1, 2, 4])
+@pytest.mark.parametrize("hours", [0.5, 3])
+def test_where_the_cut_alone_is_told_a_person_is_asked_before_parts_are_out(hours: float, k: int) -> None:
+    for seed in range(6):
+        machine = Machine(CUT, HOURS * hours, k, seed)
+        while not machine.questions:
+            machine.part()
+        question = machine.questions[0]
+        assert (len(machine.sizes) <= 12, machine.out) == (True, 0)
+        assert (question.tool_memory, question.data["lag"]) == (None, pytest.approx(3600 * hours))
+
+
+@pytest.mark.parametrize(("tells", "numbers"), [(BOTH, False), (CUT, True)])
+def test_nobody_is_asked_where_it_is_known(tells: tuple[str, ...], numbers: bool) -> None:
+    for buffer in (0, 1, 4, 25):
+        machine = Machine(tells, k=2)
+        machine.buffer, machine.numbers, machine.wear = buffer, numbers, 0.2
+        machine.run(90)
+        assert machine.questions == []
+    machine = Machine(CUT, k=2)
+    machine.buffer = 4
+    machine.run(90)
+    assert machine.questions == [], "parts that are on their way for some minutes"
+
+
+def test_what_was_answered_is_not_asked_again() -> None:
+    machine = Machine(CUT, HOURS)
+    while not machine.questions:
+        machine.part()
+    for answered, left in (((1, 3, "clock", 0), 1), ((1, 0, "clock", 0), 0)):
+        pending = PendingWrites(machine.snapshot)
+        pending.raised = machine.questions[:1]
+        leave_out_answered(pending, [answered])
+        assert len(pending.raised) == left

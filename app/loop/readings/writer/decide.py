@@ -34,7 +34,7 @@ from app.loop.readings.writer.pending import (
     Stored,
     Verdict,
 )
-from app.loop.readings.writer.slow_clock import behind, lag_with, name_clock, time_decides
+from app.loop.readings.writer.slow_clock import ask_of_clock, behind, lag_with, name_clock, time_decides
 from app.loop.readings.writer.snapshot import Arrival
 
 
@@ -100,7 +100,7 @@ def decide_reading(pending: PendingWrites, entry: Entry, reading: ReadingIn, now
     course, jump = _course(stream, deviation, compensated)
     paused_by = stream.paused_by if tool is None or stream.paused_by is not None else tool.paused_by
     timed = time_decides(stream, reading, compensated, previous_tool=previous_tool)
-    lag = lag_with(pending, stream, reading, Arrival(sequence, now, measured_at), timed=timed)
+    lag = lag_with(pending, stream, reading, Arrival(sequence, now, measured_at, reading.machined_at), timed=timed)
     total = issued_total(pending, tool) if parameters.max_total is not None else 0.0
 
     def judged(*, paused: bool) -> Decision:
@@ -131,7 +131,7 @@ def decide_reading(pending: PendingWrites, entry: Entry, reading: ReadingIn, now
     alarms = [_signal(pending, stream, signal, sequence, decision, results, fault) for signal in decision.alarms]
     name_correction(alarms, stream, newest)
     name_clock(alarms if timed else (), reading, now)
-    asked = doubt(pending, stream, reading, sequence)
+    asked = doubt(pending, stream, reading, sequence) or ask_of_clock(pending, stream, reading, decision, timed=timed)
     alarms += [alarm for alarm in (opposed, asked) if alarm is not None]
     correction = (
         _issue(pending, stream, tool, sequence, decision, now) if tool and decision.amount is not None else None

@@ -1,4 +1,4 @@
-"""Doubts about the number that a reading names as the last correction in effect: it cannot be right, or only perhaps.
+"""Doubts about what a reading says of the corrections in effect: the number that it names cannot be right, or only perhaps.
 
 The reading is decided by its number all the same, which is the best that is known; the alarm asks what does not fit. Each doubt is
 raised once: after its answer the machine may go on naming that number until it has applied the next one.
@@ -48,11 +48,18 @@ def doubt(pending: PendingWrites, stream: PendingStream, reading: ReadingIn, seq
     else:
         return None
     data["of_tool"] = named.tool_memory
-    at = (tool.machine_id, tool.number, DOUBT)
+    return ask(pending, tool.machine_id, tool.number, sequence, data)
+
+
+def ask(
+    pending: PendingWrites, machine_id: int, tool_memory: int | None, sequence: int, data: dict[str, Any]
+) -> PendingAlarm:
+    """Raise the alarm that asks about a reading, or add to the one that these readings have raised. tool_memory: None for all of the machine."""
+    at = (machine_id, tool_memory or 0, DOUBT)
     alarm = pending.tool_alarms.get(at)
     if alarm is None:
         alarm = pending.tool_alarms[at] = PendingAlarm(
-            machine_id=tool.machine_id, characteristic_id=None, tool_memory=tool.number, kind=DOUBT, sequence=sequence
+            machine_id=machine_id, characteristic_id=None, tool_memory=tool_memory, kind=DOUBT, sequence=sequence
         )
         pending.raised.append(alarm)
     alarm.data, alarm.last_sequence = data, sequence
@@ -85,4 +92,4 @@ def doubts(pending: PendingWrites) -> Iterator[PendingAlarm]:
 
 def _key(alarm: PendingAlarm) -> tuple[int, int, str, int]:
     """The doubt that an answer to this alarm settles."""
-    return alarm.machine_id, alarm.tool_memory or 0, alarm.data["why"], alarm.data["number"]
+    return alarm.machine_id, alarm.tool_memory or 0, alarm.data["why"], alarm.data.get("number", 0)

@@ -2,7 +2,8 @@
 
 `app.core.early` finds it in the sizes, if they show it: a loop that averages follows wear by half, and they do not. The times show it
 before a part is out. The time of *measurement* lies as long before its receipt in every reading for hardly another reason: the tool is
-paused with the next correction. A part may be *on its way* to the gauge as long: where `machined_at` alone is sent, sizes have to show it.
+paused with the next correction. A part may be *on its way* to the gauge as long: where `machined_at` alone is sent, sizes have to show it,
+and a person is asked once which of the two it is.
 Where the number of a correction is sent too, time decides nothing but if the part was cut before the tool was changed; there one reading
 shows it that names a correction which was issued after its part was cut.
 """
@@ -15,7 +16,7 @@ from app.core.clock import FEWEST, LEAST, constant_lag
 from app.core.decision.decide import Decision, ReadingAlarm
 from app.core.decision.limits import nanometres
 from app.loop.readings.schemas import ReadingIn
-from app.loop.readings.writer.doubts import cut_before_issue
+from app.loop.readings.writer.doubts import ask, cut_before_issue
 from app.loop.readings.writer.opposed import paused
 from app.loop.readings.writer.pending import PendingAlarm, PendingStream, PendingWrites
 from app.loop.readings.writer.snapshot import Arrival
@@ -56,10 +57,15 @@ def lag_with(
     certain = cut_before_issue(pending, stream.tool, reading)
     if certain is not None:
         return Lag(certain, reading.correction_in_effect)
-    newest = [each for each in stream.arrivals[-FEWEST:] if each.sequence > stream.start.gain_from]
-    received, stated = ([getattr(each, name).timestamp() for each in newest] for name in ("received_at", "measured_at"))
-    lag = constant_lag(received, stated)
+    newest = _newest(stream)
+    lag = constant_lag(
+        [each.received_at.timestamp() for each in newest], [each.measured_at.timestamp() for each in newest]
+    )
     return None if lag is None else Lag(lag)
+
+
+def _newest(stream: PendingStream) -> list[Arrival]:
+    return [each for each in stream.arrivals[-FEWEST:] if each.sequence > stream.start.gain_from]
 
 
 def behind(
@@ -72,6 +78,23 @@ def behind(
     said: dict[str, Any] = {"by": "clock", "before": previous_tool, "lag": round(lag.seconds, 1)}
     said |= {"readings": FEWEST} if lag.number is None else {"number": lag.number}
     return paused(pending, stream, tool, decision.deviation, EARLY, said)
+
+
+def ask_of_clock(
+    pending: PendingWrites, stream: PendingStream, reading: ReadingIn, decision: Decision, *, timed: bool
+) -> PendingAlarm | None:
+    """Ask if the clock is behind or the parts are on their way, where the next correction goes by `machined_at` alone; the alarm.
+
+    timed: time decides, by `time_decides`.
+    """
+    cut = [each.machined_at.timestamp() for each in _newest(stream) if each.machined_at is not None]
+    if not timed or decision.amount is None or reading.measured_at is not None or len(cut) < FEWEST:
+        return None
+    lag = constant_lag([each.received_at.timestamp() for each in _newest(stream)], cut)
+    if lag is None:
+        return None
+    data = {"characteristic": stream.entry.characteristic, "why": "clock", "lag": round(lag, 1), "readings": FEWEST}
+    return ask(pending, stream.entry.machine_id, None, stream.sequence + 1, data)
 
 
 def name_clock(alarms: Sequence[PendingAlarm], reading: ReadingIn, now: datetime) -> None:

@@ -96,11 +96,12 @@ class Part(NamedTuple):
 
 
 class Arrival(NamedTuple):
-    """Times of a reading: it came in, and was measured as it says; where it says nothing, that is when it came in."""
+    """Times of a reading: it came in, was measured and cut as it says; measured where it says nothing: when it came in."""
 
     sequence: int
     received_at: datetime
     measured_at: datetime
+    machined_at: datetime | None = None
 
 
 class LoadedStream(msgspec.Struct, frozen=True, kw_only=True, array_like=True):

@@ -84,7 +84,7 @@ SELECT json_build_object(
                         )
                 ) END, '[]'),
                 coalesce(CASE WHEN t.number IS NOT NULL THEN (
-                    SELECT json_agg(json_build_array(r.sequence, r.received_at, r.measured_at)
+                    SELECT json_agg(json_build_array(r.sequence, r.received_at, r.measured_at, r.machined_at)
                         ORDER BY r.sequence)
                     FROM reading r
                     WHERE r.machine_id = s.machine_id AND r.characteristic_id = s.characteristic_id
