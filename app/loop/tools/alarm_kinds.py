@@ -161,11 +161,23 @@ EARLY_EFFECT = register(
 def _in_doubt(alarm: Alarm) -> str:
     data = alarm.data
     if data["why"] == "clock":
-        return _(
+        text = _(
             "In each of the newest {n} readings of {characteristic} machined_at lies {lag} before its receipt: corrections that were "
             "applied since then count as missing from the parts. That is right if each part is as long on its way to the gauge. If the "
             "clock of the machine is behind, they are taken back, or follow the wear by half."
-        ).format(characteristic=data.get("characteristic"), lag=age(data.get("lag") or 0.0), n=data.get("readings"))
+        )
+        if data.get("before"):
+            text = _(
+                "In each of the newest {n} readings of {characteristic} machined_at lies {lag} before its receipt: the parts count as cut "
+                "before tool {of_tool} was changed, and correct nothing. That is right if each part is as long on its way to the gauge, "
+                "and wrong if the clock of the machine is behind."
+            )
+        return text.format(
+            characteristic=data.get("characteristic"),
+            lag=age(data.get("lag") or 0.0),
+            n=data.get("readings"),
+            of_tool=data.get("of_tool"),
+        )
     if data["why"] == "fell":
         fell = {
             "held": _("it is held"),

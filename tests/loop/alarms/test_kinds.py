@@ -79,6 +79,7 @@ DATA: dict[str, list[dict[str, Any]]] = {
             {"why": "fell", "status": "rejected"},
             {"why": "not_issued", "machined_at": _AT, "issued_at": _AT},
             {"why": "clock", "lag": 7200.0, "readings": 5},
+            {"why": "clock", "lag": 7200.0, "readings": 5, "before": True},
         )
     ],
     "offset_differs": [{"reported": -0.0142, "expected": -0.0061}, {"correction": 9, "reported": 1.0, "expected": 0.9}],

@@ -27,7 +27,7 @@ HOURS = timedelta(hours=1)
 class Machine:
     """A lathe that cuts a part a minute, and applies a correction before the next; wear 0.5 µm a part, scatter 0.3 µm.
 
-    tells: the times that it sends, by a clock that is behind. numbers: it sends that of the last correction, too. buffer: parts between
+    tells: the times that it sends, by a clock that is behind; confirmations have that time as well if `says_when`. numbers: it sends that of the last correction, too. buffer: parts between
     cut and receipt. step: of the size. gauge: how long before its receipt a part is measured.
     """
 
@@ -35,7 +35,7 @@ class Machine:
         self.tells, self.behind, self.buffer, self.step, self.wear = tells, behind, 0, 0.0, 0.5
         self.gauge, self.numbers, self.number, self.in_effect, self.new_at = timedelta(), False, 0, list[int](), 0
         self.at, self.chance, self.offset = datetime(2026, 3, 2, 6, tzinfo=UTC), np.random.default_rng(seed), 0.0
-        self.questions: list[Any] = []
+        self.questions, self.says_when = list[Any](), False
         self.sizes, self.cuts, self.actions, self.alarms = list[float](), list[datetime](), list[str](), list[Any]()
         self.entry, self.snapshot = Entry(1, "lathe", 1, "seat"), Snapshot(last_correction={1: 0}, versions={1: 0})
         self.snapshot.parameters[1] = Parameters(**PARAMETERS | {"weighting_factor": k})
@@ -80,7 +80,7 @@ class Machine:
         """Confirm it, some seconds later."""
         self.offset, self.number = round(self.offset + correction.amount, 9), correction.number
         tool = self.snapshot.tools[TOOL]
-        at = self.at + timedelta(seconds=5)
+        at = self.at + timedelta(seconds=5) - (self.behind if self.says_when else timedelta())
         self.snapshot.tools[TOOL] = structs.replace(
             tool,
             offset=self.offset,
@@ -300,3 +300,14 @@ def test_what_was_answered_is_not_asked_again() -> None:
         pending.raised = machine.questions[:1]
         leave_out_answered(pending, [answered])
         assert len(pending.raised) == left
+
+
+def test_after_a_tool_change_a_person_is_asked_although_all_times_are_of_one_clock() -> None:
+    """Until then they fit; but the change has the time of the server, and nothing would be corrected for hours."""
+    machine = Machine(CUT, HOURS * 3)
+    machine.says_when = True
+    machine.run(25)
+    assert (machine.questions, machine.out) == ([], 0)
+    machine.change_tool()
+    machine.run(10)
+    assert (machine.questions[0].sequence, machine.questions[0].data["before"], machine.out) == (30, True, 0)

@@ -15,6 +15,7 @@ from typing import Any, NamedTuple
 from app.core.clock import FEWEST, LEAST, constant_lag
 from app.core.decision.decide import Decision, ReadingAlarm
 from app.core.decision.limits import nanometres
+from app.core.decision.step import Code
 from app.loop.readings.schemas import ReadingIn
 from app.loop.readings.writer.doubts import ask, cut_before_issue
 from app.loop.readings.writer.opposed import paused
@@ -85,15 +86,17 @@ def ask_of_clock(
 ) -> PendingAlarm | None:
     """Ask if the clock is behind or the parts are on their way, where the next correction goes by `machined_at` alone; the alarm.
 
-    timed: time decides, by `time_decides`.
+    Or where by that none goes out, as the part counts as cut before the tool was changed. timed: time decides, by `time_decides`.
     """
+    before = decision.code is Code.BEFORE_TOOL_CHANGE
     cut = [each.machined_at.timestamp() for each in _newest(stream) if each.machined_at is not None]
-    if not timed or decision.amount is None or reading.measured_at is not None or len(cut) < FEWEST:
+    if not timed or reading.measured_at is not None or len(cut) < FEWEST or not (before or decision.amount is not None):
         return None
     lag = constant_lag([each.received_at.timestamp() for each in _newest(stream)], cut)
     if lag is None:
         return None
-    data = {"characteristic": stream.entry.characteristic, "why": "clock", "lag": round(lag, 1), "readings": FEWEST}
+    data: dict[str, Any] = {"why": "clock", "before": before, "lag": round(lag, 1), "readings": FEWEST}
+    data |= {"characteristic": stream.entry.characteristic, "of_tool": stream.parameters.tool_memory}
     return ask(pending, stream.entry.machine_id, None, stream.sequence + 1, data)
 
 
