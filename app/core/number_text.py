@@ -99,7 +99,7 @@ def has_broken_number(row: str) -> bool:
     return _BROKEN.search(plain(row)) is not None
 
 
-_IN_BRACKETS = re.compile(r"\([^()]*\d[^()]*\)|\[[^\[\]]*\d[^\[\]]*\]")
+_IN_BRACKETS = re.compile(r"\([^()\d]*\d[^()]*\)|\[[^\[\]\d]*\d[^\[\]]*\]", re.ASCII)
 _BOUND = re.compile(r"(?:[<>]=?|[≤≥])\s*[+-]?[\d.,]+", re.ASCII)
 
 
