@@ -3,6 +3,7 @@
 from datetime import UTC, datetime, timedelta
 from typing import Any
 
+import psycopg
 import pytest
 
 from tests.loop.readings.test_compensated import kept
@@ -31,6 +32,15 @@ def test_one_that_was_rejected_is_asked_about_once(shop: Shop) -> None:
     shop.acknowledge(alarm["id"], "noted")
     assert shop.read(0.5, correction_in_effect=number)["alarms"] == []
     assert doubts(shop) == []
+    with psycopg.connect(shop.server.database.dsn) as connection:
+        connection.execute("SET session_replication_role = replica")  # else it is refused: an answer is a fact
+        connection.execute(
+            "UPDATE alarm SET acknowledged_at = acknowledged_at - interval '91 days'"
+            " WHERE id = %s AND machine_id = (SELECT id FROM machine WHERE key = %s)",
+            [alarm["id"], shop.machine],
+        )
+    shop.read(0.5, correction_in_effect=number)
+    assert len(doubts(shop)) == 1, "the answer is long ago"
 
 
 def test_it_says_nothing_of_the_effect_of_corrections(shop: Shop) -> None:

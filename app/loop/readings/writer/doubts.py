@@ -1,7 +1,7 @@
 """Doubts about what a reading says of the corrections in effect: the number that it names cannot be right, or only perhaps.
 
 The reading is decided by its number all the same, which is the best that is known; the alarm asks what does not fit. Each doubt is
-raised once: after its answer the machine may go on naming that number until it has applied the next one.
+raised once in 90 days: after its answer the machine may go on naming that number until it has applied the next one.
 """
 
 from collections.abc import Iterable, Iterator

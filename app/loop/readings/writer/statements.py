@@ -194,9 +194,11 @@ LEFT JOIN LATERAL (
 WHERE p.every IS NOT NULL OR p.after_change > 0 OR p.after_alarm > 0
 """  # noqa: S608 - made of constants
 # Doubts that have been answered: each is raised once.
+ASKED_AGAIN = 90  # days after an answer: a clock that was set may be set back in autumn
 ANSWERED_DOUBTS = f"""
 SELECT machine_id, tool_memory, data ->> 'why', data ->> 'number' FROM alarm
-WHERE machine_id = ANY($1::int[]) AND characteristic_id IS NULL AND kind = '{DOUBT}' AND acknowledged_at IS NOT NULL
+WHERE machine_id = ANY($1::int[]) AND characteristic_id IS NULL AND kind = '{DOUBT}'
+    AND acknowledged_at > now() - make_interval(days => {ASKED_AGAIN})
 """  # noqa: S608 - made of constants
 ALARM_NUMBERS = "SELECT nextval('alarm_id') FROM generate_series(1, $1::int)"
 
