@@ -20,7 +20,7 @@ from app.files.aqdef import description as aqdef
 from app.files.aqdef import times as aqdef_times
 from app.files.aqdef import values as aqdef_values
 from app.files.aqdef.description import Source
-from app.files.formats import cell_values, delimited, markup, units
+from app.files.formats import cell_values, delimited, letters, markup, units
 from app.files.formats.rotary_protocol import read_protocol
 from app.geometry.alignment import form_reader as alignment
 from app.geometry.geometric_form import form_reader as geometric_form
@@ -71,6 +71,7 @@ def seconds(call: Callable[..., Any], *given: Any) -> float:
         aqdef_values._several,
         aqdef_values._entry,
         number_text.has_broken_number,
+        lambda text: letters.guessed(text.encode("cp1252", "replace")),
     ],
 )
 def test_what_is_made_of_a_cell(call: Callable[[str], Any]) -> None:

@@ -11,7 +11,7 @@ _LATIN = "äöüÄÖÜß" + _SIGNS_OF_ALL
 # The common letters of German and French, of Serbian and Slovene, and of Cyrillic; rare ones would only confuse.
 LETTERS = {
     "cp1252": _LATIN + "Øøéàç",
-    "cp1250": _LATIN + "čćšžđČĆŠŽĐ",
+    "cp1250": _LATIN + "čćšžđČĆŠŽĐľ",
     "iso-8859-2": _LATIN + "čćšžđČĆŠŽĐ",
     "cp1251": "аеионрстлвкмдпузбјљњжчцшћђАВДИКМНОПРСТ" + _SIGNS_OF_ALL,
     "iso-8859-5": "аеионрстлвкмдпузбјљњжчцшћђАВДИКМНОПРСТ",
@@ -27,33 +27,51 @@ LANGUAGES = {
     "iso-8859-2": _EASTERN,
     "cp1251": _CYRILLIC,
     "iso-8859-5": _CYRILLIC,
+    "cp850": _WESTERN,
     "cp1254": ("âçğıîöşûüi\N{COMBINING DOT ABOVE}",),
     "cp1257": ("ąčęėįšųūž", "āčēģīķļņšūž"),
     "cp1253": ("αβγδεζηθικλμνξοπρστυφχψωςάέήίϊΐόύϋΰώ",),
-    "cp850": _WESTERN,
     "cp852": _EASTERN,
     "cp866": _CYRILLIC,
+    "mac_roman": _WESTERN,
 }
 """The letters beyond a to z of each language, in lower case, by the encodings that its files have."""
-_OF_ONE_SCRIPT = frozenset({"cp1251", "iso-8859-5", "cp866", "cp1253"})
+_COMMON = {
+    **dict.fromkeys(("cp1251", "iso-8859-5", "cp866"), frozenset("оаеинтрслвкмд")),
+    "cp1253": frozenset("αοιετσνρημκλςάόήίέ"),
+}
+"""Letters of which most text of a script is made: the bytes of one encoding are rare letters in another."""
+_OF_ONE_SCRIPT = frozenset(_COMMON)
+_OF_DOS_AND_MAC = frozenset({"cp850", "cp852", "mac_roman"})
 _WORD = re.compile(r"[^\W\d_]+")
-_SIGN_WITHIN = re.compile(r"(?<=[^\W\d_])[°±²³×„“”‚‹›«»•¹¼½¾¿§…](?=[^\W\d_])|[\x80-\x9f\N{REPLACEMENT CHARACTER}]")
-# No word of theirs: õ and û at the end, ì, ò and ù within, œ before another letter than i or u; č and ć between consonants; ъ, ы
+_SIGN_WITHIN = re.compile(
+    r"(?<=[^\W\d_])[°±²³×„“”‚‹›«»•¹¼½¾¿§…](?=[^\W\d_])|(?<=[^\W\d_])[¼½¾]|(?<=[^\W\d_nN])º|(?<!\d)ª(?=[^\W\d_])|(?<=[^\W\d_])¡|[\x80-\x9f\N{REPLACEMENT CHARACTER}]"
+)
+# No word of theirs: á between vowels or behind one at the end, õ and û at the end, ì, ò and ù within, œ before another letter than i or u; č and ć between consonants; ъ, ы
 # and ь at the beginning.
 _FOREIGN = {
-    "western": re.compile(r"[õû](?![^\W\d_])|[ìòù](?=[^\W\d_])|œ(?![iu])", re.IGNORECASE),
-    "eastern": re.compile(r"(?<=[bcdfghjklmnpqstvwxz])[čć](?=[bcdfghjklmnpqstvwxz])", re.IGNORECASE),
+    "western": re.compile(
+        r"ã(?=[bcdfgjklnprtvxz])|(?<=[aeiou])á(?:[aeiou]|(?![^\W\d_]))|[õû](?![^\W\d_])|[ìòù](?=[^\W\d_])|œ(?![iu])",
+        re.IGNORECASE,
+    ),
+    "eastern": re.compile(
+        r"ľ(?=[eií])|[čć](?=c)|(?<=[aeiou])á(?:[aeiou]|(?![^\W\d_]))|(?<=[bcdfghjklmnpqstvwxz])[čć](?=[bcdfghjklmnpqstvwxz])",
+        re.IGNORECASE,
+    ),
     "cyrillic": re.compile(r"\b[ъыь]", re.IGNORECASE),
 }
 _FAMILY = {
     **dict.fromkeys(("cp1251", "iso-8859-5", "cp866"), "cyrillic"),
     **dict.fromkeys(("cp1250", "iso-8859-2", "cp852"), "eastern"),
-    **dict.fromkeys(("cp1252", "cp850"), "western"),
+    **dict.fromkeys(("cp1252", "cp850", "mac_roman"), "western"),
 }
 MOST_LINES = 500
+MOST = 100_000  # bytes of them
+_WHOLE_LETTERS = re.compile(rb"[\x00-\xff]*[\x00-\x3f]")  # no letter of two bytes is cut there
 LONGEST_OF_ONE = 2  # letters of a word that may have no Latin letter among them
 _SIGNS = re.compile("[" + re.escape(_SIGNS_OF_ALL) + "]")
 _STRANGE = re.compile("[^\x00-\x7f\\w" + re.escape(_SIGNS_OF_ALL) + "¼½¾¿¡©®™№•‹›]")
+CLEARLY = 1.5  # common letters more that another script has to have
 FEWEST = 2  # letters of two bytes
 CAPITALS = 32  # bytes among which the capitals of a script lie
 _BEYOND = re.compile(r"[^\x00-\x7f]")
@@ -81,12 +99,18 @@ TO_NAME = {
 def guessed(content: bytes) -> tuple[str, bool]:
     """The encoding whose letters fit best, and whether they are letters of Europe rather than of East Asia."""
     lines = b"\n".join([line for line in content.splitlines() if not line.isascii()][:MOST_LINES])
+    if len(lines) > MOST:
+        whole = _WHOLE_LETTERS.match(lines[:MOST])
+        lines = whole[0] if whole else lines[:MOST]
     texts = {name: lines.decode(name, "replace") for name in LETTERS}
     best = max(LETTERS, key=lambda name: (_is_of_a_language(texts[name], name), _fit(texts[name], LETTERS[name])))
     if not _is_of_a_language(texts[best], best):
         others = {name: lines.decode(name, "replace") for name in LANGUAGES if name not in LETTERS}
         best = next((name for name, text in others.items() if _is_of_a_language(text, name)), best)
         texts |= others
+    if best in _COMMON:
+        first, texts = best, texts | {name: lines.decode(name, "replace") for name in _COMMON}
+        best = max(_COMMON, key=lambda name: _common(texts[name], name) + CLEARLY * (name == first))
     usual = all(sign in LETTERS.get(best, "") for sign in _BEYOND.findall(texts[best]))
     return best, usual or _known(texts[best]) > 0 or not any(_is_asian(lines, each) for each in TO_NAME.values())
 
@@ -113,8 +137,21 @@ def _is_of_a_language(text: str, encoding: str) -> bool:
             return False
     elif any(len(word) > LONGEST_OF_ONE and len(_BEYOND.findall(word)) == len(word) for word in words):
         return False
+    if any(_has_capital_within(word, least_doubt=encoding in _OF_DOS_AND_MAC) for word in words):
+        return False
     letters = set(_BEYOND.findall(" ".join(words).lower()))
     return any(letters <= set(alphabet) for alphabet in LANGUAGES[encoding])
+
+
+def _has_capital_within(word: str, *, least_doubt: bool) -> bool:
+    """Tell of a word with a capital beyond ASCII in front of a small letter within the word. least_doubt: or behind one, as in InnenØ."""
+    beyond = (at for at, letter in enumerate(word) if at and letter.isupper() and not letter.isascii())
+    return any(word[at + 1 : at + 2].islower() or (least_doubt and word[at - 1].islower()) for at in beyond)
+
+
+def _common(text: str, encoding: str) -> int:
+    """Common letters of a script in a text that can be of it."""
+    return sum(letter in _COMMON[encoding] for letter in text.lower()) if _is_of_a_language(text, encoding) else -1
 
 
 def _known(text: str) -> int:

@@ -69,6 +69,10 @@ def test_a_heading_that_is_known_tells_the_encoding(encoding: str) -> None:
                 "Šířka",
                 "faţă",
                 "Točkić",
+                "Hriadeľ",
+                "Kužeľ",
+                "Şaibă",
+                "Lăcaş",
             )
         ),
         *(
@@ -83,15 +87,21 @@ def test_a_heading_that_is_known_tells_the_encoding(encoding: str) -> None:
                 "Ø40",
                 "Año ñ",
                 "Läbimõõt",
+                "Hauteur pièce",
+                "InnenØ",
+                "MaßÄnderung",
+                "Diámetro real",
+                "Nº de peça",
             )
         ),
-        *(("cp1251", each) for each in ("Вал", "Кольцо ось", "Объём", "Пречник жлеба", "Внутрішній")),
-        *(("cp1253", each) for each in ("Διάμετρος", "Ο άξονας", "οπή")),
+        *(("cp1251", each) for each in ("Вал", "Кольцо ось", "Объём", "Пречник жлеба", "Внутрішній", "УГОЛ", "Паз")),
+        *(("cp1253", each) for each in ("Διάμετρος", "Ο άξονας", "οπή", "ΔΙΑΜΕΤΡΟΣ", "ΜΗΚΟΣ", "ΓΩΝΙΑ")),
         *(("cp1254", each) for each in ("İç çap", "Dış-Ş1", "Gövde ağız")),
         *(("cp1257", each) for each in ("Žiedas ė", "Ašis ė")),
-        *(("cp850", each) for each in ("Gehäuse", "Größe")),
-        *(("cp852", each) for each in ("Točkić žleb",)),
+        *(("cp850", each) for each in ("Gehäuse", "Größe", "Außenmaß", "Fuß", "Diamètre")),
+        *(("cp852", each) for each in ("Točkić žleb", "Průměr", "Rozměr", "drážky")),
         *(("cp866", each) for each in ("Диаметр", "отверстие")),
+        *(("iso-8859-2", each) for each in ("Dužina", "Kužeľ")),
     ],
 )
 def test_a_name_of_one_language_keeps_its_letters(encoding: str, text: str) -> None:
