@@ -61,6 +61,23 @@ def test_values_in_one_line_for_all_characteristics(tmp_path: Path, end: str) ->
     assert [each.line for each in found] == [7, 7, 8, 8]
 
 
+@pytest.mark.parametrize("in_rows", [True, False])
+def test_values_that_are_marked_are_there_and_not_to_be_evaluated(tmp_path: Path, in_rows: bool) -> None:
+    """The example files of the format differ from a plain count of their numbers by such marks alone.
+
+    304 marks the reference values of gauge studies, the sizes of masters; 1 lives of tools and parts that were cut off before
+    their end: neither is a part that was made. 255 and 256 mark places where nothing was measured, with a 0 as their value.
+    """
+    marks = ["304", "0", "", "1", "256", "255", "0,304", "129"]
+    rows = [f"40.00{at}{F}{mark}{F}12.08.2026/15:2{at}:00" for at, mark in enumerate(marks)]
+    if not in_rows:
+        rows = [line for at, mark in enumerate(marks) for line in (f"K0001/1 40.00{at}", f"K0002/1 {mark}")]
+    _description, found = parsed(tmp_path, HEAD + rows)
+    read = [aqdef_values.read_value(each) for each in found if isinstance(each, Value)]
+    attributes = [each.attribute if isinstance(each, Measured) else each for each in read]
+    assert attributes == [304, 0, 0, 1, None, None, 304, 129]
+
+
 def test_values_in_lines_of_their_own(tmp_path: Path) -> None:
     rows = ["K0001/1 1", "K0004/1 1.2.2026/3:04:05", "K0001/1 1.1", "K0001/2 2", "K0002/2 290", "K0001/2 2.1"]
     _description, found = parsed(tmp_path, HEAD + rows)

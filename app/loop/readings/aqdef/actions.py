@@ -34,7 +34,8 @@ from app.loop.readings.importing.history import Flawed, Summary, store_history
 from app.loop.readings.records import Entry
 from app.loop.tables.readings import ImportMapping, Reading
 
-MEANINGS = {129: "invalid", 290: "implausible"}
+MEANINGS = {1: "cut off before its end", 129: "invalid", 290: "implausible", 304: "reference value"}
+"""K0002, as example files of the format have it in words around it: 1 of lives, 304 of gauge studies."""
 _JOINERS = "\N{ZERO WIDTH NON-JOINER}\N{ZERO WIDTH JOINER}"
 
 
