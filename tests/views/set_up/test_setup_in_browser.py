@@ -110,8 +110,12 @@ def test_what_saves_is_in_sight_and_what_few_need_is_folded_but_printed(signed_i
     page = signed_in
     page.set_viewport_size({"width": 1280, "height": 800})
     page.goto(f"/setup/characteristics/{shop.characteristic}")
-    expect(page.get_by_role("button", name="Save")).to_be_in_viewport(ratio=1)
-    assert page.evaluate("document.documentElement.scrollHeight") <= 2400, "three screens at most, where it was five"
+    save = page.get_by_role("button", name="Save")
+    expect(save).not_to_be_in_viewport()  # of a new one the first size comes next
+    shop.read(1.0)
+    page.reload()
+    expect(save).to_be_in_viewport(ratio=1)
+    assert page.evaluate("document.documentElement.scrollHeight") <= 2250, "three screens at most, where it was five"
     folded = [page.locator(f"[name={name}]") for name in ("variant", "max_step", "part")] + [
         page.locator("#program-text")
     ]
@@ -120,7 +124,7 @@ def test_what_saves_is_in_sight_and_what_few_need_is_folded_but_printed(signed_i
     page.emulate_media(media="print")
     for field in folded:
         expect(field).to_be_visible()
-    expect(page.get_by_role("button", name="Save")).to_be_hidden()
+    expect(save).to_be_hidden()
     page.emulate_media(media="screen")
     page.get_by_label("On this page").get_by_role("link", name="Probing").click()
     expect(folded[0]).to_be_in_viewport()
