@@ -89,10 +89,11 @@ def ask_of_clock(
     Or where by that none goes out, as the part counts as cut before the tool was changed. timed: time decides, by `time_decides`.
     """
     before = decision.code is Code.BEFORE_TOOL_CHANGE
-    cut = [each.machined_at.timestamp() for each in _newest(stream) if each.machined_at is not None]
-    if not timed or reading.measured_at is not None or len(cut) < FEWEST or not (before or decision.amount is not None):
+    if not timed or reading.measured_at is not None or not (before or decision.amount is not None):
         return None
-    lag = constant_lag([each.received_at.timestamp() for each in _newest(stream)], cut)
+    newest = _newest(stream)
+    cut = [each.machined_at.timestamp() for each in newest if each.machined_at is not None]
+    lag = constant_lag([each.received_at.timestamp() for each in newest], cut) if len(cut) == len(newest) else None
     if lag is None:
         return None
     data: dict[str, Any] = {"why": "clock", "before": before, "lag": round(lag, 1), "readings": FEWEST}
