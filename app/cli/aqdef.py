@@ -8,6 +8,7 @@ from zoneinfo import ZoneInfo
 import typer
 
 from app.cli.base import say
+from app.cli.stored import stored_before, stored_of
 from app.language.i18n import _, ngettext
 from app.language.times import MINUTES, written
 
@@ -101,7 +102,10 @@ def _tell(found: "list[Content]", chosen: dict[int, str], encoding: str) -> None
     """Print how the file is understood."""
     from app.loop.readings.aqdef.matching import NEW
 
-    say(_("{count} characteristics, {encoding} text.").format(count=len(found), encoding=encoding.removesuffix("-sig")))
+    text = ngettext(
+        "%(num)d characteristic, %(encoding)s text.", "%(num)d characteristics, %(encoding)s text.", len(found)
+    )
+    say(text % {"num": len(found), "encoding": encoding.removesuffix("-sig")})
     for each in found:
         key = chosen.get(each.index)
         if each.obstacle:
@@ -142,16 +146,21 @@ def _result(result: "Result", *, dry_run: bool) -> None:
     summary = result.summary
     assert summary is not None
     begin = _("Nothing was stored; this would be: ") if dry_run else ""
-    text = _("{stored} readings of {characteristic}").format(stored=summary.stored, characteristic=result.key)
-    if summary.first_at is not None and summary.last_at is not None:
+    text = stored_of(summary.stored, result.key)
+    if summary.stored and summary.first_at is not None and summary.last_at is not None:
         text += _(", measured {span}").format(
             span=f"{written(summary.first_at, MINUTES)} – {written(summary.last_at, MINUTES)}"
         )
     say(f"{begin}{text}.", style="bold")
     if summary.repeated:
-        say(_("{count} were stored before and are not stored again.").format(count=summary.repeated))
+        say(stored_before(summary.repeated))
     if result.excluded:
-        say(_("{count} are excluded, as the file marks them (K0002).").format(count=result.excluded))
+        text = ngettext(
+            "%(num)d is excluded, as the file marks it (K0002).",
+            "%(num)d are excluded, as the file marks them (K0002).",
+            result.excluded,
+        )
+        say(text % {"num": result.excluded})
 
 
 def export_file(

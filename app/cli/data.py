@@ -2,7 +2,7 @@
 
 import getpass
 import sys
-from collections.abc import Iterable, Iterator
+from collections.abc import Collection, Iterable, Iterator
 from contextlib import contextmanager, nullcontext
 from dataclasses import replace
 from enum import StrEnum
@@ -15,6 +15,7 @@ import typer
 from app.cli import aqdef
 from app.cli.base import DatabaseUrl, DataDir, cli, existing, people, say, settings_from
 from app.cli.context import OfContext, chosen_context
+from app.cli.stored import stored_before, stored_of
 from app.errors import Invalid
 from app.language.i18n import _, ngettext
 from app.language.times import MINUTES, in_zone, plant_zone, written
@@ -252,7 +253,7 @@ def _with_missing(
     return columns, machine
 
 
-def _sum_up_all(results: "Iterable[ColumnResult]", *, live: bool, dry_run: bool) -> None:
+def _sum_up_all(results: "Collection[ColumnResult]", *, live: bool, dry_run: bool) -> None:
     from app.loop.readings.importing.history import Flawed
 
     for column, result, trouble, created in results:
@@ -265,6 +266,8 @@ def _sum_up_all(results: "Iterable[ColumnResult]", *, live: bool, dry_run: bool)
             report(trouble)
         elif trouble is not None:
             say(f"{column.characteristic}: {trouble.detail} {trouble.what_to_do or ''}", style="bold red")
+    if not live and any(result is not None for _column, result, _trouble, _created in results):
+        say(_("They are history: no correction, no alarm, and the running average stays as it was."))
 
 
 def _import_aqdef(
@@ -448,16 +451,16 @@ def _alike(flaws: "Iterable[Flaw]") -> "Iterator[tuple[str, str, list[Flaw]]]":
 
 def _sum_up(summary: "Summary", characteristic: str, *, live: bool, dry_run: bool) -> None:
     begin = _("Nothing was stored; this would be: ") if dry_run else ""
-    text = _("{stored} readings of {characteristic}").format(stored=summary.stored, characteristic=characteristic)
+    text = stored_of(summary.stored, characteristic)
     if dry_run and live:
         text = _("{lines} lines can be read").format(lines=summary.lines)
     numbers = None if summary.first_sequence is None else (summary.first_sequence, summary.last_sequence)
-    span = (summary.first_at, summary.last_at) if summary.first_at is not None and summary.last_at is not None else None
+    span = (summary.first_at, summary.last_at) if summary.stored and summary.first_at and summary.last_at else None
     say(f"{begin}{text}{_which(numbers, span)}.", style="bold")
     for note in summary.notes:
         say(note, style="yellow")
     if summary.repeated:
-        say(_("{count} were stored before and are not stored again.").format(count=summary.repeated))
+        say(stored_before(summary.repeated))
     if summary.zones:
         say(_("Zones: {zones}").format(zones=", ".join(f"{zone} {count}" for zone, count in summary.zones.items())))
     if live and not dry_run:
@@ -466,8 +469,6 @@ def _sum_up(summary: "Summary", characteristic: str, *, live: bool, dry_run: boo
                 corrections=summary.corrections, alarms=summary.alarms
             )
         )
-    elif not live:
-        say(_("They are history: no correction, no alarm, and the running average stays as it was."))
 
 
 def _which(numbers: tuple[int, int | None] | None, span: "tuple[datetime, datetime] | None") -> str:

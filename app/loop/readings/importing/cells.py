@@ -212,7 +212,8 @@ def _labels(cells: Sequence[str], layout: Layout) -> list[str]:
 
 def _stranger(line: int, cells: Sequence[Any], layouts: Sequence[Layout]) -> Passed | None:
     """A row of a characteristic that is not read."""
-    if not layouts[0].only or (name := named_in(cells, layouts[0])) in {each.only for each in layouts}:
+    read = {each.only for each in layouts} | layouts[0].of_others
+    if not layouts[0].only or (name := named_in(cells, layouts[0])) in read:
         return None
     return Passed(line, _("is of {name}, which is not chosen").format(name=repr(name)))
 

@@ -49,16 +49,16 @@ class ColumnResult(NamedTuple):
 
 def columns_by_name(layout: Layout, known: Sequence[CurrentCharacteristic]) -> dict[int, str]:
     """The columns whose name is the key or the name of a characteristic: its key by place in the header."""
-    names: dict[str, list[str]] = {}
+    names: dict[str, set[str]] = {}  # Ring Bore and ring-bore, its name and its key, are alike
     for current in known:
-        for name in {current.characteristic.key, current.characteristic.name}:
-            names.setdefault(cell_values.folded(name), []).append(current.characteristic.key)
+        for name in (current.characteristic.key, current.characteristic.name):
+            names.setdefault(cell_values.folded(name), set()).add(current.characteristic.key)
     found: dict[int, str] = {}
     taken = {place for field, places in layout.columns.items() if field != "measured" for place in places}
     for place, name in enumerate(layout.subjects):
-        keys = names.get(cell_values.folded(name), [])
-        if (layout.names or place not in taken) and len(keys) == 1 and keys[0] not in found.values():
-            found[place] = keys[0]
+        keys = names.get(cell_values.folded(name), set())
+        if (layout.names or place not in taken) and len(keys) == 1 and not keys & set(found.values()):
+            found[place] = next(iter(keys))
     return found
 
 
@@ -107,6 +107,9 @@ def import_wide(
             with session.begin_nested() as part:
                 try:
                     own = layout_of(layout, column, unit)
+                    if layout.names:  # what nobody reads is said once
+                        others = [layout.names[each.place] for each in there] if column == there[0] else layout.names
+                        own = replace(own, of_others=frozenset(others))
                     found = (
                         lines(path, own, entry.characteristic) if read is None else read(place, entry.characteristic)
                     )

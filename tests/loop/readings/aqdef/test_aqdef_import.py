@@ -360,7 +360,7 @@ def test_the_command_says_what_becomes_of_each(plant: Database, tmp_path: Path) 
     )
     assert "W1 Angle: left out: is not a length: its unit is '°' (K2142)." in done.stderr
     assert "3 readings of shaft-d40, measured 2026-03-02 06:00 – 2026-03-02 06:01." in done.stderr
-    assert "1 are excluded" in done.stderr
+    assert "1 is excluded" in done.stderr
     with plant.begin() as session:
         machines.add_machine(session, MachineIn(key="mill-1", name="Mill 1", control="fanuc"), "tests")
     done = inband("import", path, "--timezone", "Europe/Berlin", "--create-missing", INBAND_DATABASE_URL=plant.dsn)

@@ -683,6 +683,7 @@ def test_of_such_a_table_what_is_missing_is_set_up_with_its_limits(plant: Plant,
     assert (parameters["upper_deviation"], parameters["natural_limit"]) == (0.01, "lower")
     plant.shop.call("GET", f"/characteristics/{stem}-n", 404)
     assert plant.command(path, create_missing=True) == "", "what is there now is found by its name"
+    plant.shop.call("GET", f"/characteristics/{stem}-d-2", 404)
     assert [size for size, _at in plant.stored(f"{stem}-d")] == PARTS["Seal_1_D"]
 
 
@@ -850,6 +851,22 @@ def test_of_such_a_table_one_characteristic_gets_its_own_rows_or_a_question(plan
     columns = {"characteristic": "id", "measured": "actual", "part": "partnb"}
     readings, faults, _words = bridged(path, {name: name.lower() for name in PARTS}, columns=columns)
     assert (len(readings), faults) == (9, [])
+
+
+def test_what_is_read_beside_is_not_called_passed_over(plant: Plant, tmp_path: Path, capsys: Any) -> None:
+    path, stem = tmp_path / "a.csv", plant.shop.another("beside").replace("-", "")
+    rows = f"{stem} A;16;16.1;15.9;16.001\n{stem} B;8;8.1;7.9;8.001\nC;8;;;8.001\n"
+    path.write_text(f"Name;Nominal;USL;LSL;Actual\n{rows}")
+    assert plant.command(path, create_missing=True, machine=plant.shop.machine) == ""
+    said = capsys.readouterr().err.split()
+    told = " ".join(said)
+    assert told.count("passed over") == 1, "of the one that nobody reads, once"
+    assert "line 4: is of 'C', which is not chosen; passed over." in told
+    assert f"1 reading of {stem}-b" in told
+    assert told.count("They are history") == 1
+    assert plant.command(path, create_missing=True, machine=plant.shop.machine) == ""
+    again = " ".join(capsys.readouterr().err.split())
+    assert f"0 readings of {stem}-b. 1 was stored before and is not stored again." in again
 
 
 def test_of_a_name_and_a_value_a_row_each_is_of_the_characteristic_it_names(plant: Plant, tmp_path: Path) -> None:
