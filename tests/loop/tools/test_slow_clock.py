@@ -252,6 +252,17 @@ def test_a_tool_that_was_changed_is_no_guess_where_numbers_show_the_clock(hours:
         assert machine.out == 1
 
 
+def test_a_number_that_shows_some_minutes_hides_no_reading_that_shows_more() -> None:
+    machine = Machine(BOTH, timedelta(minutes=15.5))
+    machine.numbers = True
+    machine.run(25)
+    machine.change_tool()
+    machine.run(10)
+    [alarm] = machine.alarms
+    assert (alarm.data["before"], alarm.data["lag"]) == (True, 15.5 * 60)
+    assert "number" not in alarm.data
+
+
 @pytest.mark.parametrize("tells", [CUT, BOTH])
 @pytest.mark.parametrize("buffer", [0, 1, 12, 40])
 def test_numbers_of_parts_on_the_way_show_no_clock(tells: tuple[str, ...], buffer: int) -> None:

@@ -55,14 +55,14 @@ def lag_with(
         stream.arrivals.append(arrival)
     if not timed:
         return None
-    certain = cut_before_issue(pending, stream.tool, reading)
-    if certain is not None:
-        return Lag(certain, reading.correction_in_effect)
     newest = _newest(stream)
     lag = constant_lag(
         [each.received_at.timestamp() for each in newest], [each.measured_at.timestamp() for each in newest]
     )
-    return None if lag is None else Lag(lag)
+    if lag is not None:
+        return Lag(lag)
+    certain = cut_before_issue(pending, stream.tool, reading)
+    return None if certain is None else Lag(certain, reading.correction_in_effect)
 
 
 def _newest(stream: PendingStream) -> list[Arrival]:
