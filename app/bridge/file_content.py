@@ -270,7 +270,8 @@ class _Reader:
 
     def _thousands(self, table: Sequence[tuple[int, Found]], column: str, unit: str | None) -> str:
         """The question about a column of sizes in a small unit whose sign may part thousands; empty where nothing is in doubt."""
-        if self.settings.decimal is not None or self.settings.format != "csv":
+        sheet = self.settings.format == "xlsx"
+        if not sheet and (self.settings.decimal is not None or self.settings.format != "csv"):
             return ""
         rows = [row for _line, row in table if isinstance(row, Mapping)]
         cells = [unit_behind(str(cell_of(row, column) or "")) for row in rows]
@@ -280,8 +281,8 @@ class _Reader:
             *(length_unit(each) for _, each in cells),
         }
         small = next((each for each in said if each is not None and LENGTHS[each] < 1), None)
-        number = delimited.like_thousands(text for text, _unit in cells) if small else ""
-        return delimited.thousands_in_doubt(number, str(small)) if number else ""
+        number = delimited.like_thousands((text for text, _unit in cells), sheet=sheet) if small else ""
+        return delimited.thousands_in_doubt(number, str(small), sheet=sheet) if number else ""
 
     def _statistics(self, line: int, label: str) -> None:
         """A row of limits or statistics, which is no part."""

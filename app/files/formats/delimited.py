@@ -314,23 +314,27 @@ def decimal_of(cells: Iterable[str]) -> str:
 _LIKE_THOUSANDS = re.compile(r"[+\-\N{MINUS SIGN}]?[1-9]\d{0,2}[.,]\d{3}")
 
 
-def like_thousands(cells: Iterable[str]) -> str:
+def like_thousands(cells: Iterable[str], *, sheet: bool = False) -> str:
     """The first number in which a sign may part thousands, where none of the others tells; empty if there is none.
+
+    sheet: of a workbook, whose numbers have a point and no 0 at the end: others are texts.
 
     >>> like_thousands(["980", "1.250"]), like_thousands(["1.250", "0.980"]), like_thousands(["1.25"])
     ('1.250', '', '')
     """
     signed = [cell.strip() for cell in cells if "." in cell or "," in cell]
-    numbers = [cell for cell in signed if _is_number(cell)]
+    numbers = [cell for cell in signed if _is_number(cell) and (not sheet or "," in cell or cell.endswith("0"))]
     return numbers[0] if numbers and all(map(_LIKE_THOUSANDS.fullmatch, numbers)) else ""
 
 
-def thousands_in_doubt(number: str, unit: str) -> str:
+def thousands_in_doubt(number: str, unit: str, *, sheet: bool = False) -> str:
     """The question about such a number in a unit in which either may be meant."""
     words = _(
         "{number} {unit} may be {small} or {large}: say how decimals are written (--decimal, in a bridge decimal); separators of "
         "thousands have to be removed"
     )
+    if sheet:
+        words = _("{number} {unit} is a text that may be {small} or {large}: make it a number in the workbook")
     whole, part = re.split("[.,]", number)
     return words.format(number=number, unit=unit, small=f"{whole}.{part}", large=f"{whole}{part}")
 

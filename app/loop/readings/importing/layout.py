@@ -127,7 +127,8 @@ class Layout:
     def refuse_thousands(self, place: int, unit: str | None) -> None:
         """Refuse numbers of a small unit that may be a thousand times as large: 1.250 µm of a German file. Raises `Invalid`."""
         if place in self.thousands and LENGTHS[unit or "mm"] < 1:
-            raise wrong("decimal", delimited.thousands_in_doubt(self.thousands[place], unit or "mm"))
+            sheet = self.kind == "sheet"
+            raise wrong("decimal", delimited.thousands_in_doubt(self.thousands[place], unit or "mm", sheet=sheet))
 
     def of_one(self, key: str, name: str) -> "Layout":
         """The layout for one characteristic: of a table with rows of several, its own rows. Raises `Invalid`."""
@@ -286,7 +287,7 @@ def _csv_layout(path: Path, wishes: Wishes, zone: ZoneInfo | None, kind: str = "
         said_unit=(unit_of(header[place], wishes.unit) or units[place]) if "measured" in columns else wishes.unit,
         units=units,
         doubt="" if wishes.unit or "unit" in columns else doubt,
-        thousands={} if wishes.decimal or kind == "sheet" else _thousands(below, range(len(header))[only]),
+        thousands={} if wishes.decimal and kind == "csv" else _thousands(below, range(len(header))[only], kind),
         nominal=nominal_of(header, columns, wishes.mapping),
         zone=zone,
         time_format=wishes.time_format,
@@ -307,11 +308,10 @@ def _csv_layout(path: Path, wishes: Wishes, zone: ZoneInfo | None, kind: str = "
     return replace(_timed(made, _times(made, below, rows)), drawn=_drawn(made, named))
 
 
-def _thousands(rows: Sequence[Row], places: Iterable[int]) -> dict[int, str]:
+def _thousands(rows: Sequence[Row], places: Iterable[int], kind: str) -> dict[int, str]:
     """A number in which a sign may part thousands for each of these columns where no number tells."""
-    found = {
-        place: delimited.like_thousands(unit_behind(text_of(row, (place,)))[0] for row in rows) for place in places
-    }
+    texts = {place: [unit_behind(text_of(row, (place,)))[0] for row in rows] for place in places}
+    found = {place: delimited.like_thousands(each, sheet=kind == "sheet") for place, each in texts.items()}
     return {place: number for place, number in found.items() if number}
 
 

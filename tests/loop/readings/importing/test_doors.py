@@ -363,6 +363,23 @@ BOOKS = {
         bridge={"statistics": "skip"},
         formats={"B2": '0.00"mm"', "B4": '0.00"mm"'},
     ),
+    "workbook in microinches": Case(
+        cells=[
+            ["Time", "D40 [µin]"],
+            [DAY.replace(hour=6, minute=5), 40000],
+            [DAY.replace(hour=6, minute=6), 40010.125],
+        ],
+        good=morning(1.016, 1.016257175),
+        size="1.016",
+        column="D40 [µin]",
+    ),
+    "workbook with a text of thousands": Case(
+        cells=[["Time", "D40 [µin]"], [DAY, 40000], [DAY, "40,010"]],
+        size="1.016",
+        column="D40 [µin]",
+        whole=True,
+        words="40,010 uin is a text that may be 40.010 or 40010",
+    ),
     "workbook with a formula": Case(
         cells=[["Time", "D40"], [DAY, 40.001], [DAY, "=A1"], [DAY, "#N/A"]], bad=(3, 4), words="formula"
     ),
@@ -489,7 +506,7 @@ def as_expected(found: Readings, case: Case) -> bool:
 def names_of(case: Case) -> tuple[list[str], str]:
     """The names of the columns, and the one that is measured."""
     if case.cells:
-        return ["Date", "Time"] if "Date" in case.cells[0] else ["Time"], "D40"
+        return ["Date", "Time"] if "Date" in case.cells[0] else ["Time"], case.column or "D40"
     rows = [line for line in case.text.replace("\ufeff", "").splitlines() if line and "sep=" not in line]
     head = next(
         line
