@@ -98,6 +98,8 @@ async def deliver(job: Job, settings: Settings) -> Answer:
         return Answer(delivered=False, text=_("no answer within {n} s").format(n=f"{STEP:g}"), perhaps=True)
     except (OSError, smtplib.SMTPException, httpx.HTTPError, httpx.InvalidURL, ValueError) as error:
         text = f"{type(error).__name__}: {error}" if str(error) else type(error).__name__
+        if isinstance(error, httpx.ConnectError | httpx.ConnectTimeout):
+            text = _("the receiver cannot be reached: check its address, that it runs, and firewalls between")
         return Answer(delivered=False, text=_short(_certificate_refused(error) or text))
 
 

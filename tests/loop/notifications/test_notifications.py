@@ -326,7 +326,7 @@ def test_a_dead_mail_server_disturbs_nothing(new_database: NewDatabase, hooks: H
             shop.read(350)
             until(lambda: deliveries(shop, andon, "delivered"))
             failed = until(lambda: deliveries(shop, mail, "failed"))[0]
-            assert "ConnectionRefusedError" in failed["answer"]
+            assert "no mail server listens at" in failed["answer"]
             assert shop.read(1)["sequence"] == 2
     drop_database(url)
 
@@ -578,6 +578,12 @@ def test_the_address_that_was_checked_is_the_one_connected_to(monkeypatch: pytes
     assert answer == Answer(delivered=True, text="204 No Content")
     (post,) = [post for post in hooks.posts if post.path == path]
     assert post.headers["host"] == f"no-such-name.invalid:{hooks.server_port}"
+
+
+def test_a_webhook_that_nobody_answers_says_what_to_look_at() -> None:
+    answer = run(deliver(webhook("http://127.0.0.1:9/"), Settings(**NETWORKS)))
+    assert not answer.delivered
+    assert "check its address" in answer.text
 
 
 def test_webhooks_do_not_lead_to_a_server_that_only_listens_inside(hooks: Hooks) -> None:
