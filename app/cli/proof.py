@@ -78,6 +78,6 @@ def _tell(proof: "Proof") -> None:
                 say(f"      {words}", style="bold red")
     counts = _("{examples} examples, {numbers} numbers: ").format(examples=len(proof.results), numbers=proof.numbers)
     if proof.passed:
-        say(counts + _("all as published, or as derived where the source says so."), style="bold")
+        say(counts + _("all as published, or as expected where the source says how."), style="bold")
     else:
         say(counts + _("{failing} not as published.").format(failing=len(proof.failing)), style="bold red")

@@ -17,14 +17,15 @@ class Basis(StrEnum):
     PUBLISHED = "published"
     DERIVED = "derived"
     COMPUTED = "computed"
+    SIMULATED = "simulated"
 
 
 @dataclass(frozen=True, slots=True)
 class Case:
     """One example. `tolerance`: by name of what is expected; a list where every entry of a list has its own.
 
-    relative: tolerances are shares of what is expected. basis: published in `source`, derived by hand, or computed by
-    other means than the engine; then `source` says how, and what was not looked up.
+    relative: tolerances are shares of what is expected. basis: published in `source`, derived by hand, computed by
+    other means than the engine, or known because what was given was made up; then `source` says how, and what was not looked up.
     """
 
     kind: str

@@ -38,7 +38,7 @@ class ExampleOut(BaseModel):
         examples=["NIST/SEMATECH e-Handbook of Statistical Methods, 6.3.2.2"], description="Where it was published."
     )
     basis: Basis = Field(
-        description="published in `source`; derived by hand, or computed independently, as `source` says.",
+        description="published in `source`; derived by hand, computed independently, or simulated, as `source` says.",
         examples=["published"],
     )
     note: str = Field(description="Why it cannot come out nearer, where that needs saying.")

@@ -75,9 +75,12 @@ def written(value: Value | None) -> str:
 
 def basis(case: Case) -> str:
     """Source of expected numbers that nobody published; empty for published ones."""
-    return {Basis.PUBLISHED: "", Basis.DERIVED: _("derived by hand"), Basis.COMPUTED: _("computed independently")}[
-        case.basis
-    ]
+    return {
+        Basis.PUBLISHED: "",
+        Basis.DERIVED: _("derived by hand"),
+        Basis.COMPUTED: _("computed independently"),
+        Basis.SIMULATED: _("simulated"),
+    }[case.basis]
 
 
 def expected(case: Case) -> str:

@@ -41,6 +41,7 @@ def test_what_nobody_published_says_so() -> None:
     for case in cases():
         said = case.source.lower()
         assert (case.basis is Basis.DERIVED) == said.startswith("derived by hand"), case.name
+        assert (case.basis is Basis.SIMULATED) == said.startswith("simulated"), case.name
         assert ("computed independently" in said) >= (case.basis is Basis.COMPUTED), case.name
         assert case.basis is not Basis.PUBLISHED or not said.startswith(("computed", "not looked up")), case.name
 
