@@ -2,7 +2,7 @@
 
 import getpass
 import sys
-from collections.abc import Collection, Iterable, Iterator
+from collections.abc import Collection, Iterator
 from contextlib import contextmanager, nullcontext
 from dataclasses import replace
 from enum import StrEnum
@@ -15,7 +15,7 @@ import typer
 from app.cli import aqdef
 from app.cli.base import DatabaseUrl, DataDir, cli, existing, people, say, settings_from
 from app.cli.context import OfContext, chosen_context
-from app.cli.stored import stored_before, stored_of
+from app.cli.stored import sentences, stored_before, stored_of
 from app.errors import Invalid
 from app.language.i18n import _, ngettext
 from app.language.times import MINUTES, in_zone, plant_zone, written
@@ -25,7 +25,6 @@ if TYPE_CHECKING:
 
     from app.core.period import Period
     from app.loop.readings.aqdef.sorting import Wishes as AqdefWishes
-    from app.loop.readings.importing.cells import Flaw
     from app.loop.readings.importing.history import Flawed, Summary
     from app.loop.readings.importing.layout import Layout, Wishes
     from app.loop.readings.importing.wide import Column, ColumnResult
@@ -34,7 +33,6 @@ SINCE, UNTIL = (
     "Measured at this moment or later; a day begins at midnight.",
     "Measured before this moment; a day is included, all of it.",
 )
-ALIKE = 3  # lines in a row with the same flaw that are named one by one
 
 
 class Unit(StrEnum):
@@ -398,6 +396,9 @@ def _tell(layout: "Layout", *, wide: bool = False) -> None:
     """Print how the file is understood, so that a wrong guess is seen."""
     known = ", ".join(f"{name} ← {layout.named(name)}" for name in layout.columns)
     say(_("Columns: {known} (in {unit})").format(known=known, unit=layout.unit))
+    if layout.letters:
+        words = _("Letters are read as {encoding}: “{text}”. If that is wrong, name the encoding: --encoding.")
+        say(words.format(encoding=layout.encoding, text=layout.letters), style="yellow")
     if layout.ignored and not wide:
         say(_("Not used: {names}").format(names=", ".join(layout.ignored)))
     if "measured_at" not in layout.columns:
@@ -419,34 +420,13 @@ def _bar(file: Path) -> Iterator[Any]:
 def report(refusal: "Flawed", *, stored: bool = True) -> None:
     """Say how many lines are wrong, then each with its reason; where line after line is wrong in one way, the first and how far."""
     say(refusal.detail, style="bold red")
-    for column, reason, flaws in _alike(refusal.flaws):
-        listed = flaws if len(flaws) <= ALIKE + 1 else flaws[:ALIKE]
-        for flaw in listed:
-            say(str(flaw))
-        if len(listed) < len(flaws):
-            lines = _("lines {first} to {last}").format(first=flaws[ALIKE].line, last=flaws[-1].line)
-            say(f"{lines}{f', {column}' if column else ''}: {reason}")
+    for sentence in sentences(refusal.flaws):
+        say(sentence)
     more = refusal.count - len(refusal.flaws)
     if more > 0:
         say(_("… and {more} more.").format(more=more))
     if stored and refusal.what_to_do:
         say(refusal.what_to_do, style="bold red")
-
-
-def _alike(flaws: "Iterable[Flaw]") -> "Iterator[tuple[str, str, list[Flaw]]]":
-    """Flaws of neighbouring lines with the same column and reason, together."""
-    together: list[Flaw] = []
-    for flaw in flaws:
-        if together and (flaw.column, flaw.reason, flaw.line) != (
-            together[-1].column,
-            together[-1].reason,
-            together[-1].line + 1,
-        ):
-            yield together[0].column, together[0].reason, together
-            together = []
-        together.append(flaw)
-    if together:
-        yield together[0].column, together[0].reason, together
 
 
 def _sum_up(summary: "Summary", characteristic: str, *, live: bool, dry_run: bool) -> None:

@@ -1,6 +1,14 @@
-"""Sentences on readings that an import stored."""
+"""Sentences on readings that an import stored, and on lines that it cannot take."""
 
-from app.language.i18n import ngettext
+from collections.abc import Iterable, Iterator
+from typing import TYPE_CHECKING
+
+from app.language.i18n import _, ngettext
+
+if TYPE_CHECKING:
+    from app.loop.readings.importing.cells import Flaw
+
+ALIKE = 3  # lines in a row with the same flaw that are named one by one
 
 
 def stored_of(count: int, characteristic: str) -> str:
@@ -17,3 +25,29 @@ def stored_before(count: int) -> str:
         count,
     )
     return text % {"num": count}
+
+
+def sentences(flaws: "Iterable[Flaw]") -> Iterator[str]:
+    """Each flaw; where line after line is wrong in one way, the first ones and how far."""
+    for column, reason, alike in _alike(flaws):
+        listed = alike if len(alike) <= ALIKE + 1 else alike[:ALIKE]
+        yield from map(str, listed)
+        if len(listed) < len(alike):
+            lines = _("lines {first} to {last}").format(first=alike[ALIKE].line, last=alike[-1].line)
+            yield f"{lines}{f', {column}' if column else ''}: {reason}"
+
+
+def _alike(flaws: "Iterable[Flaw]") -> "Iterator[tuple[str, str, list[Flaw]]]":
+    """Flaws of neighbouring lines with the same column and reason, together."""
+    together: list[Flaw] = []
+    for flaw in flaws:
+        if together and (flaw.column, flaw.reason, flaw.line) != (
+            together[-1].column,
+            together[-1].reason,
+            together[-1].line + 1,
+        ):
+            yield together[0].column, together[0].reason, together
+            together = []
+        together.append(flaw)
+    if together:
+        yield together[0].column, together[0].reason, together

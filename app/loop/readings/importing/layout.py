@@ -63,6 +63,7 @@ class Layout:
     header: tuple[str, ...]
     columns: Mapping[str, tuple[int, ...]]  # field -> places in the header; a date and a time may be two
     encoding: str = "utf-8"
+    letters: str = ""  # the first cell by which a person sees if a guessed encoding is right
     delimiter: str = ","
     decimal: str = "."
     said_unit: str | None = None  # of the column of sizes, by a person or its header; a row or a cell may say its own
@@ -282,6 +283,7 @@ def _csv_layout(path: Path, wishes: Wishes, zone: ZoneInfo | None, kind: str = "
         header=header,
         columns=columns,
         encoding=encoding,
+        letters="" if wishes.encoding or encoding.startswith("utf") else _letters(chain(top, below)),
         delimiter=delimiter,
         decimal=wishes.decimal or delimited.decimal_of(sample),
         said_unit=(unit_of(header[place], wishes.unit) or units[place]) if "measured" in columns else wishes.unit,
@@ -306,6 +308,12 @@ def _csv_layout(path: Path, wishes: Wishes, zone: ZoneInfo | None, kind: str = "
         (row.line, row.cells) for row in rows_of(path, made) if isinstance(row, Row) and tuple(row.cells) != header
     )
     return replace(_timed(made, _times(made, below, rows)), drawn=_drawn(made, named))
+
+
+def _letters(rows: Iterable[Row]) -> str:
+    """The first cell with a letter beyond ASCII."""
+    beyond = (cell.strip() for row in rows for cell in row.cells if not cell.isascii())
+    return next((cell[:40] for cell in beyond if any(each.isalpha() and not each.isascii() for each in cell)), "")
 
 
 def _thousands(rows: Sequence[Row], places: Iterable[int], kind: str) -> dict[int, str]:

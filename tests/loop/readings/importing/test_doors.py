@@ -886,6 +886,25 @@ def test_what_is_read_beside_is_not_called_passed_over(plant: Plant, tmp_path: P
     assert f"0 readings of {stem}-b. 1 was stored before and is not stored again." in again
 
 
+def test_letters_that_are_guessed_are_shown_with_a_name(plant: Plant, tmp_path: Path, capsys: Any) -> None:
+    """Ψ1 and Ø1 are one byte: only a person knows."""
+    path, key = tmp_path / "a.csv", plant.shop.another("letters", **D40)
+    path.write_bytes("Time;Part;D40\n18.11.2025 06:05;Ψ1;40,001\n".encode("cp1253"))
+    how = {"characteristic": key, "mapping": "measured=D40", "dry_run": True}
+    assert plant.command(path, **how) == ""
+    assert "Letters are read as cp1252: “Ø1”." in " ".join(capsys.readouterr().err.split())
+    data = {"csrf": plant.engineer.csrf(), "characteristic": key}
+    sent = plant.engineer.browser.post("/import", data=data, files={"file": ("a.csv", path.read_bytes())})
+    assert "Guessed: cp1252, such as “Ø1”." in html.unescape(sent.text)
+    assert plant.command(path, encoding="cp1253", **how) == ""
+    assert "Letters are" not in capsys.readouterr().err
+    assert plant.page(path, key, column_measured="3", encoding="iso-8859-7") == ""
+    with plant.house.database.begin() as session:
+        entry = queries.entry_of(session, key)
+        assert entry is not None
+        assert [row["part"] for row in exporting.rows(session, entry)] == ["Ψ1"]
+
+
 def test_of_a_name_and_a_value_a_row_each_is_of_the_characteristic_it_names(plant: Plant, tmp_path: Path) -> None:
     path, key = tmp_path / "two.csv", plant.shop.another("bore", **D40)
     text = "Name;Value\nBore;40.001\nShaft;40.002\n"
