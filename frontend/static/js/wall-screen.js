@@ -7,6 +7,8 @@ import { age } from "./times.js";
 
 const PATIENCE = 15_000; // ms for one answer
 const CALM = 5_000; // ms without an answer before it is said in red
+const SMALLEST = 0.4; // share of their usual size that letters have at least
+const PHONE = 1_000; // px; one scrolls on narrower screens
 const REFUSED = 60_000; // ms between two looks with a key that was refused
 
 class WallScreen extends HTMLElement {
@@ -16,6 +18,7 @@ class WallScreen extends HTMLElement {
     this.full = this.querySelector(".wall-full");
     this.full.hidden = !document.fullscreenEnabled;
     this.full.addEventListener("click", () => document.documentElement.requestFullscreen().catch(() => {}));
+    addEventListener("resize", () => this.fit());
     addEventListener("hashchange", () => location.reload());
     setInterval(() => this.show(), 1_000);
     if (location.hash.length > 1) this.look();
@@ -53,6 +56,15 @@ class WallScreen extends HTMLElement {
     this.unanswered = null;
     this.clock = made.querySelector("time")?.textContent;
     this.say("live", "");
+    this.fit();
+  }
+
+  // Nobody scrolls a screen on the wall: where there is more than it holds, the letters are smaller.
+  fit() {
+    for (let share = 1; share >= SMALLEST; share -= 0.05) {
+      document.body.style.setProperty("--fit", share.toFixed(2));
+      if (innerWidth <= PHONE || document.documentElement.scrollHeight <= innerHeight) return;
+    }
   }
 
   // Never before the server has answered: a browser's own page of what it could not load would hang there for good.

@@ -177,6 +177,10 @@ def test_it_says_since_when_it_is_old_goes_on_and_ends_when_revoked(
     page.goto(f"{server.url}/wall#{screen['url'].partition('#')[2]}")
     tile, trouble = page.locator(".wall-machines li").first, page.locator(".wall-trouble")
     expect(tile).to_be_visible()
+    share = page.locator("body[style]").evaluate("each => Number(each.style.getPropertyValue('--fit'))")
+    fits = "share => { document.body.style.setProperty('--fit', share); return document.documentElement.scrollHeight <= innerHeight; }"
+    assert page.evaluate(fits, share), "nobody scrolls it"
+    assert share == 1 or not page.evaluate(fits, share + 0.05), "letters are no smaller than they have to be"
     page.route("**/wall/now", lambda route: route.abort())
     page.clock.fast_forward(6_000)
     expect(trouble).to_be_hidden()
