@@ -166,6 +166,7 @@ def shown(value: Any) -> str:
 
 def _csv(path: Path, layouts: Sequence[Layout]) -> Iterator[Item]:
     readers, nominal = [_readers(layout) for layout in layouts], dict[str, tuple[int, str]]()
+    of_names = _of_names(layouts)
     try:
         for row in rows_of(path, layouts[0]):
             if isinstance(row, Unusable):
@@ -183,16 +184,16 @@ def _csv(path: Path, layouts: Sequence[Layout]) -> Iterator[Item]:
                 flaw = Flaw(row.line, "", shown(label), words)
                 yield from (Item(place, row.line, flaw) for place in range(len(layouts)))
                 continue
-            if (stranger := _stranger(row.line, row.cells, layouts)) is not None:
-                yield Item(0, row.line, stranger)
+            name = named_in(row.cells, layouts[0])
+            if not (places := of_names.get(name, of_names.get("", ()))):
+                yield Item(0, row.line, _stranger(row.line, name))
                 continue
             other = _other_nominal(row.line, row.cells, layouts[0], nominal)
-            for place, own in enumerate(layouts):
-                if not own.only or own.only == named_in(row.cells, own):
-                    if other is not None:
-                        yield Item(place, row.line, other)
-                        continue
-                    yield from (Item(place, row.line, found) for found in _of_row(row, own, readers[place]))
+            for place in places:
+                if other is not None:
+                    yield Item(place, row.line, other)
+                    continue
+                yield from (Item(place, row.line, found) for found in _of_row(row, layouts[place], readers[place]))
     except Unusable as error:
         line = error.line or 0
         yield from (Item(place, line, Flaw(line, "", "", str(error))) for place in range(len(layouts)))
@@ -210,11 +211,16 @@ def _labels(cells: Sequence[str], layout: Layout) -> list[str]:
     return [*named, cells[first].strip()]
 
 
-def _stranger(line: int, cells: Sequence[Any], layouts: Sequence[Layout]) -> Passed | None:
+def _of_names(layouts: Sequence[Layout]) -> dict[str, list[int]]:
+    """The places of the layouts by the one name whose rows each reads; those without one, which read all rows, by an empty one."""
+    found: dict[str, list[int]] = {}
+    for place, layout in enumerate(layouts):
+        found.setdefault(layout.only, []).append(place)
+    return found
+
+
+def _stranger(line: int, name: str) -> Passed:
     """A row of a characteristic that is not read."""
-    read = {each.only for each in layouts} | layouts[0].of_others
-    if not layouts[0].only or (name := named_in(cells, layouts[0])) in read:
-        return None
     return Passed(line, _("is of {name}, which is not chosen").format(name=repr(name)))
 
 
@@ -373,19 +379,19 @@ def _context(text: str) -> Any:
 
 def _json(path: Path, layouts: Sequence[Layout]) -> Iterator[Item]:
     nominal: dict[str, tuple[int, str]] = {}
+    of_names = _of_names(layouts)
     for number, value in objects(path, layouts[0].kind):
         cells = [value.get(name) for name in layouts[0].header] if isinstance(value, dict) else []
-        if cells and (stranger := _stranger(number, cells, layouts)) is not None:
-            yield Item(0, number, stranger)
+        name = named_in(cells, layouts[0]) if cells else ""
+        if not (places := of_names.get(name, of_names.get("", ())) if cells else range(len(layouts))):
+            yield Item(0, number, _stranger(number, name))
             continue
         other = _other_nominal(number, cells, layouts[0], nominal) if cells else None
-        for place, layout in enumerate(layouts):
-            if cells and layout.only and layout.only != named_in(cells, layout):
-                continue
+        for place in places:
             if other is not None:
                 yield Item(place, number, other)
                 continue
-            yield from (Item(place, number, found) for found in _of_object(number, value, layout))
+            yield from (Item(place, number, found) for found in _of_object(number, value, layouts[place]))
 
 
 def _of_object(number: int, value: Any, layout: Layout) -> Iterator["dict[str, Any] | Flaw | Passed"]:

@@ -84,7 +84,6 @@ class Layout:
         default_factory=dict
     )  # where each row says of which characteristic it is, by name
     only: str = ""  # the one of them that is read
-    of_others: frozenset[str] = frozenset()  # those that are read beside it, about whose rows there is nothing to say
     parts: tuple[str, ...] = ()  # columns that are parts, where each row is a characteristic
     skips_blank: bool = False  # a row without the measured value says nothing: another column of a wide sheet has one
 

@@ -61,10 +61,22 @@ def read_apart(path: Path, layouts: Sequence[Layout], most: int | None = None) -
             apart(put_down, path, layouts, folder, most, spend)
         except Unusable as error:
             raise wrong("file", str(error)) from None
-        mark, now = fingerprint(path), datetime.now(UTC)
-        yield lambda place, characteristic: _readings(
-            taken(folder / str(place)), layouts[place], characteristic, mark, now
-        )
+        yield _held(path, layouts, folder)
+
+
+@contextmanager
+def read_here(path: Path, layouts: Sequence[Layout]) -> Iterator[Read]:
+    """Read a file in this process, once for all layouts, however long it is."""
+    with TemporaryDirectory(prefix=PREFIX) as name:
+        put_down(path, layouts, Path(name), None, lambda _size: None)
+        yield _held(path, layouts, Path(name))
+
+
+def _held(path: Path, layouts: Sequence[Layout], folder: Path) -> Read:
+    mark, now = fingerprint(path), datetime.now(UTC)
+    return lambda place, characteristic: _readings(
+        taken(folder / str(place)), layouts[place], characteristic, mark, now
+    )
 
 
 def _before_a_time(

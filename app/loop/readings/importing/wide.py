@@ -22,7 +22,7 @@ from app.loop.readings.importing.cells import MOST_FLAWS, Flaw
 from app.loop.readings.importing.columns import ORIGIN
 from app.loop.readings.importing.history import Flawed, Progress, Summary, store_history
 from app.loop.readings.importing.layout import Layout, unit_of
-from app.loop.readings.importing.lines import Read, lines, read_apart
+from app.loop.readings.importing.lines import Read, lines, read_apart, read_here
 from app.loop.readings.records import Entry
 
 
@@ -97,6 +97,10 @@ def import_wide(
     are set up whose characteristic is `NEW`.
     """
     _refuse_twice(columns)
+    if read is None and layout.names:  # once for all names, of which a file may have a thousand
+        how: dict[str, Any] = {"actor": actor, "source": source, "dry_run": dry_run, "progress": progress}
+        with read_here(path, [_layout_of(layout, column, unit) for column in columns]) as held:
+            return import_wide(database, columns, path, layout, unit=unit, machine=machine, read=held, **how)
     with database.sessions() as session:
         there = _with_new(session, columns, layout, machine, actor)
         entries = [(place, column, _entry(session, column)) for place, column in enumerate(there)]
@@ -107,9 +111,6 @@ def import_wide(
             with session.begin_nested() as part:
                 try:
                     own = layout_of(layout, column, unit)
-                    if layout.names:  # what nobody reads is said once
-                        others = [layout.names[each.place] for each in there] if column == there[0] else layout.names
-                        own = replace(own, of_others=frozenset(others))
                     found = (
                         lines(path, own, entry.characteristic) if read is None else read(place, entry.characteristic)
                     )
