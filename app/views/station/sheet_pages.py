@@ -81,7 +81,8 @@ def _sheet(
     return page(
         request,
         "station/sheet.html",
-        status=error.status if error else 422 if questions else 200,
+        refusal=error,
+        status=422 if questions else 200,
         machine=named,
         sheet=shown,
         only=only,
