@@ -411,8 +411,8 @@ class Server:
 
     def hang_up(self) -> None:
         """Close the clients that were given out."""
-        for client in self._clients:
-            client.close()
+        while self._clients:
+            self._clients.pop().close()
 
     def close(self) -> None:
         self.hang_up()
@@ -523,7 +523,9 @@ def server(request: pytest.FixtureRequest, run_server: RunServer) -> Iterator[Se
     One of its own needs whoever looks at lists or settings of the whole plant, or stops the server.
     """
     if request.node.get_closest_marker("own_server") is None:
-        yield request.getfixturevalue("common_server")
+        common: Server = request.getfixturevalue("common_server")
+        yield common
+        common.hang_up()  # a worker that runs all files would hold more files open than `select` can count
         return
     with run_server() as running:
         yield running
