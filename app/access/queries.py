@@ -110,7 +110,7 @@ class PersonRow(NamedTuple):
     signed_in_at: datetime | None
 
 
-def people(session: Session, after: int = 0, limit: int = 1000) -> list[PersonRow]:
+def people(session: Session, after: int = 0, limit: int | None = None) -> list[PersonRow]:
     """Everybody, in the order in which they came; the disabled too."""
     last = (
         select(BrowserSession.person_id, func.max(BrowserSession.created_at).label("at"))
@@ -161,7 +161,7 @@ def open_invitations(session: Session) -> Sequence[Invitation]:
     ).all()
 
 
-def role_keys(session: Session, after: int = 0, limit: int = 1000) -> Sequence[ApiKey]:
+def role_keys(session: Session, after: int = 0, limit: int | None = None) -> Sequence[ApiKey]:
     """The keys that have a role, revoked ones too."""
     return session.scalars(
         select(ApiKey).where(ApiKey.role.is_not(None), ApiKey.id > after).order_by(ApiKey.id).limit(limit)

@@ -61,7 +61,7 @@ def revoke_screen(session: Session, number: int, actor: str) -> None:
         record(session, actor, "wall screen revoked", f"wall-screen/{number}", {"name": screen.name}, None)
 
 
-def screens(session: Session, after: int = 0, limit: int = 1000) -> Sequence[WallScreen]:
+def screens(session: Session, after: int = 0, limit: int | None = None) -> Sequence[WallScreen]:
     """Wall screens whose key is valid, the oldest first."""
     query = select(WallScreen).where(WallScreen.revoked_at.is_(None), WallScreen.id > after)
     return session.scalars(query.order_by(WallScreen.id).limit(limit)).all()

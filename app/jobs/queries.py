@@ -13,7 +13,7 @@ def runs(session: Session) -> dict[str, JobRun]:
     return {run.job: run for run in session.scalars(select(JobRun))}
 
 
-def failures(session: Session, limit: int = 1000) -> Sequence[JobFailure]:
+def failures(session: Session, limit: int | None = None) -> Sequence[JobFailure]:
     """Units of work that fail, the longest first."""
     return session.scalars(select(JobFailure).order_by(JobFailure.first_at, JobFailure.subject).limit(limit)).all()
 

@@ -63,7 +63,7 @@ def _form(
         errors=errors,
         evaluated=evaluated,
         **COMMON,
-        machines=machines(session, limit=100_000),
+        machines=machines(session),
     )
 
 

@@ -246,7 +246,7 @@ def next_number(session: Session, machine: Machine) -> int:
 # --- where the empirical value came from
 
 
-def value_changes(session: Session, machine: Machine, location: int, limit: int = 1000) -> list[Origin]:
+def value_changes(session: Session, machine: Machine, location: int, limit: int | None = None) -> list[Origin]:
     """Earlier and present empirical values of a location, newest first, from the record of changes."""
     entries = session.scalars(_changes(machine, location).limit(limit)).all()
     return _origins(session, machine, location, entries)
@@ -313,7 +313,7 @@ def pairs(
     location: int,
     *,
     after: int = 0,
-    limit: int = 1000,
+    limit: int | None = None,
     only: int | None = None,
     newest: bool = False,
 ) -> list[Pair]:

@@ -119,8 +119,7 @@ def copy_machine(session: Session, source: Machine, given: MachineIn, keys: Mapp
             session, MachineIn(**settings | given.model_dump(exclude_unset=True)), actor
         )
         there = {
-            current.characteristic.key: current
-            for current in queries.characteristics(session, machine_id=source.id, limit=100_000)
+            current.characteristic.key: current for current in queries.characteristics(session, machine_id=source.id)
         }
         wrong = [_("{key} is not on {machine}").format(key=key, machine=source.key) for key in keys if key not in there]
         for key, new_key in sorted(

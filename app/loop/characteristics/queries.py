@@ -129,7 +129,7 @@ def characteristics(
     after: str = "",
     by: str = "key",
     skip: int = 0,
-    limit: int = 1000,
+    limit: int | None = None,
 ) -> list[CurrentCharacteristic]:
     """Characteristics of one machine or of all, by key or by another one of `ORDERS`, the largest first after a minus.
 
@@ -146,7 +146,7 @@ def characteristics(
 
 
 def versions(
-    session: Session, characteristic: Characteristic, *, before: int | None = None, limit: int = 1000
+    session: Session, characteristic: Characteristic, *, before: int | None = None, limit: int | None = None
 ) -> Sequence[ParametersVersion]:
     """The versions of its parameters, newest first."""
     query = (

@@ -72,7 +72,7 @@ def _rows() -> Select[Connection, Machine, datetime]:
 
 
 def connections(
-    session: Session, after: str = "", limit: int = 1000, only: int | None = None, holding: str = ""
+    session: Session, after: str = "", limit: int | None = None, only: int | None = None, holding: str = ""
 ) -> Sequence[ConnectionRow]:
     """The connections by the key of their machine; ``only`` this one for the key of a machine.
 

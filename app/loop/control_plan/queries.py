@@ -97,7 +97,7 @@ def plan_of(session: Session, current: CurrentCharacteristic) -> ControlPlan | N
 
 
 def planned(
-    session: Session, *, machine_id: int | None = None, after: str = "", limit: int = 1000
+    session: Session, *, machine_id: int | None = None, after: str = "", limit: int | None = None
 ) -> Sequence[tuple[ControlPlan, Characteristic, Machine]]:
     """Plans that ask for something, by the key of the characteristic."""
     query = (
@@ -248,7 +248,7 @@ def missed(
     characteristic: Characteristic | None = None,
     period: Period = ALWAYS,
     before: int | None = None,
-    limit: int = 1000,
+    limit: int | None = None,
 ) -> list[MissedRow]:
     """Missed measurements, the last found first."""
     query = (

@@ -28,7 +28,7 @@ def caller_of_key(session: Session, secret_hash: bytes) -> Caller | None:
     return Caller("key", f"key {row.name}", role=cast("Role", row.role), key_id=row.id)
 
 
-def machine_keys(session: Session, machine_id: int, after: int = 0, limit: int = 1000) -> Sequence[ApiKey]:
+def machine_keys(session: Session, machine_id: int, after: int = 0, limit: int | None = None) -> Sequence[ApiKey]:
     """The keys of one machine, revoked ones too."""
     return session.scalars(
         select(ApiKey).where(ApiKey.machine_id == machine_id, ApiKey.id > after).order_by(ApiKey.id).limit(limit)

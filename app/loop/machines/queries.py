@@ -52,7 +52,7 @@ def key_is_taken(session: Session, key: str) -> bool:
     return session.scalar(select(Machine.id).where(Machine.key == key)) is not None
 
 
-def machines(session: Session, after: str = "", limit: int = 1000, only: int | None = None) -> Sequence[Machine]:
+def machines(session: Session, after: str = "", limit: int | None = None, only: int | None = None) -> Sequence[Machine]:
     """All machines by key; ``only`` this one for the key of a machine."""
     query = select(Machine).where(Machine.key > after).order_by(Machine.key).limit(limit)
     return session.scalars(query if only is None else query.where(Machine.id == only)).all()

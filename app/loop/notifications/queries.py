@@ -15,22 +15,24 @@ from app.loop.notifications.tables import Delivery, NotificationRoute, Receiver,
 Row = TypeVar("Row", NotificationRoute, Receiver, ReceiverGroup)
 
 
-def routes(session: Session, after: int = 0, limit: int = 1000) -> Sequence[NotificationRoute]:
+def routes(session: Session, after: int = 0, limit: int | None = None) -> Sequence[NotificationRoute]:
     """Routes, in the order in which they were added."""
     return _rows(session, NotificationRoute, after, limit)
 
 
-def receivers(session: Session, after: int = 0, limit: int = 1000) -> Sequence[Receiver]:
+def receivers(session: Session, after: int = 0, limit: int | None = None) -> Sequence[Receiver]:
     """Receivers, in the order in which they were added."""
     return _rows(session, Receiver, after, limit, Receiver.deleted_at.is_(None))
 
 
-def groups(session: Session, after: int = 0, limit: int = 1000) -> Sequence[ReceiverGroup]:
+def groups(session: Session, after: int = 0, limit: int | None = None) -> Sequence[ReceiverGroup]:
     """Groups of receivers, in the order in which they were added."""
     return _rows(session, ReceiverGroup, after, limit)
 
 
-def _rows(session: Session, table: type[Row], after: int, limit: int, *only: ColumnElement[bool]) -> Sequence[Row]:
+def _rows(
+    session: Session, table: type[Row], after: int, limit: int | None, *only: ColumnElement[bool]
+) -> Sequence[Row]:
     return session.scalars(select(table).where(*only, table.id > after).order_by(table.id).limit(limit)).all()
 
 

@@ -31,7 +31,9 @@ def plan(session: Session, number: int, version: int | None = None) -> ReactionP
     return found
 
 
-def versions(session: Session, number: int, before: int | None = None, limit: int = 1000) -> Sequence[ReactionPlan]:
+def versions(
+    session: Session, number: int, before: int | None = None, limit: int | None = None
+) -> Sequence[ReactionPlan]:
     """The versions of a plan, the newest first. Raises `NotFound`."""
     plan(session, number)
     query = select(ReactionPlan).where(ReactionPlan.id == number)
@@ -58,7 +60,7 @@ def pictures_there(session: Session, digests: Iterable[str]) -> set[str]:
     return set(session.scalars(select(ReactionPicture.digest).where(ReactionPicture.digest.in_(list(digests)))))
 
 
-def catalogue(session: Session, after: int = 0, limit: int = 1000) -> Sequence[CatalogueEntry]:
+def catalogue(session: Session, after: int = 0, limit: int | None = None) -> Sequence[CatalogueEntry]:
     """Causes and corrective actions, retired ones too, in the order in which they were added."""
     query = select(CatalogueEntry).where(CatalogueEntry.id > after).order_by(CatalogueEntry.id).limit(limit)
     return session.scalars(query).all()

@@ -73,7 +73,7 @@ def list_page(
         machine=chosen,
         current=current,
         about=queries.latest_advice(session, current) if current else None,
-        machines=machines.machines(session, limit=100_000),
+        machines=machines.machines(session),
         may_change=caller.may("engineer"),
         may_enter=caller.may("operator"),
         wording=wording,
@@ -200,7 +200,7 @@ def _form(
     study: StudyRow | None = None,
 ) -> Response:
     begun = form_reader.begun(kind, typed)
-    usable = characteristics.characteristics(session, limit=100_000)
+    usable = characteristics.characteristics(session)
     return page(
         request,
         "gauge_studies/form.html",
@@ -209,7 +209,7 @@ def _form(
         typed=begun,
         grid=grid or form_reader.shape(kind, {}),
         study=study,
-        machines=[(machine.key, machine.name) for machine in machines.machines(session, limit=100_000)],
+        machines=[(machine.key, machine.name) for machine in machines.machines(session)],
         characteristics=[("", _("none"))]
         + [
             (row.characteristic.key, f"{row.characteristic.key} – {row.characteristic.name}, {row.machine.name}")

@@ -82,7 +82,7 @@ def compare_page(
         everywhere=_address("/compare", keys, {**said, **choice.of_range}),
         chart_url=_address("/api/v1/compare/figure", keys, {**said, **period}),
         link=link,
-        known=characteristics.characteristics(session, limit=100_000),
+        known=characteristics.characteristics(session),
         most=MOST,
         capability=capability,
     )

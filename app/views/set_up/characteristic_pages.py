@@ -65,7 +65,7 @@ def characteristics_page(
         "characteristics",
         part=part_of(rows, ON_PAGE, skip, lambda _last: skip + ON_PAGE, partial(link, sort=by), "skip"),
         order=Order(by, link),
-        machines=machines.machines(session, limit=100_000),
+        machines=machines.machines(session),
         machine=chosen,
         q=q,
         mode_words=cache(lambda mode: parameter_form.choice("mode", mode.value)),
@@ -149,7 +149,7 @@ def _new(
         caller,
         "characteristics",
         status=status,
-        machines=[(machine.key, machine.name) for machine in machines.machines(session, limit=100_000)],
+        machines=[(machine.key, machine.name) for machine in machines.machines(session)],
         **_form(typed, errors),
     )
 

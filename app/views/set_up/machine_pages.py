@@ -72,14 +72,14 @@ def signal_paths() -> list[tuple[str, str]]:
 @router.get("/setup/machines")
 def machines_page(request: Request, session: SessionDep, caller: Viewer) -> Response:
     counts: dict[int, int] = {}
-    for current in characteristics.characteristics(session, limit=100_000):
+    for current in characteristics.characteristics(session):
         counts[current.machine.id] = counts.get(current.machine.id, 0) + 1
     return setup_page(
         request,
         "machines.html",
         caller,
         "machines",
-        machines=queries.machines(session, limit=100_000),
+        machines=queries.machines(session),
         characteristics=counts,
         keys=keys.keys_by_machine(session),
         controls=dict(controls()),
@@ -132,13 +132,8 @@ def _new(request: Request, caller: Caller, typed: Mapping[str, str], refusal: In
 def _typed_like(session: Session, like: str) -> dict[str, str]:
     """The form of a copy: the next number in its keys, which stay for good."""
     source = queries.machine_named(session, like)
-    number, key = many_actions.next_number(
-        source.key, [machine.key for machine in queries.machines(session, limit=100_000)]
-    )
-    there = [
-        current.characteristic.key
-        for current in characteristics.characteristics(session, machine_id=source.id, limit=100_000)
-    ]
+    number, key = many_actions.next_number(source.key, [machine.key for machine in queries.machines(session)])
+    there = [current.characteristic.key for current in characteristics.characteristics(session, machine_id=source.id)]
     lines = [f"{each} = {many_actions.key_like(each, source.key, key, number)}" for each in there]
     settings = {name: _shown(getattr(source, name)) for name in ("control", "type", *COUNTS)}
     return settings | {"key": key, "like": source.key, "characteristics": "\n".join(lines)}

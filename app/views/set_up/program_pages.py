@@ -120,9 +120,9 @@ def _page(
         wording=wording,
         characteristics=[
             (row.characteristic.key, f"{row.characteristic.name} · {row.machine.name}")
-            for row in queries.characteristics(session, limit=100_000)
+            for row in queries.characteristics(session)
         ],
-        machines=[("", _("not said"))] + [(row.key, row.name) for row in machines(session, limit=100_000)],
+        machines=[("", _("not said"))] + [(row.key, row.name) for row in machines(session)],
         longest=MOST_CHARACTERS,
         diagram=parameter_form.diagram(parameter_form.typed_partly(parameters)) if judging else None,
         sentences=[],

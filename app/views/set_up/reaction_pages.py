@@ -195,7 +195,7 @@ def _plan(
         rules=[(rule.value, rule_name(rule)) for rule in RuleName],
         characteristics=[
             (each.characteristic.key, f"{each.characteristic.name} · {each.machine.name}")
-            for each in characteristics.characteristics(session, limit=100_000)
+            for each in characteristics.characteristics(session)
         ],
         receivers=notifications.receivers(session),
         steps=range(1, min(steps, MOST_STEPS) + 1),

@@ -66,7 +66,7 @@ def _stations(
     badge_error: InbandError | None = None,
 ) -> Response:
     wrong = error or badge_error
-    all_machines = machines.machines(session, limit=100_000)
+    all_machines = machines.machines(session)
     people = identification.identifiable(session)
     return setup_page(
         request,

@@ -4,7 +4,9 @@ from typing import Any
 
 import pytest
 from sqlalchemy import text
+from sqlalchemy.orm import Session
 
+from app.loop.machines.queries import machines
 from tests.shop import PARAMETERS, Shop
 
 SERBIAN = "Струг „Морава” бр. 1 – 'А' \"Б\"; DROP TABLE machine;--"
@@ -147,3 +149,14 @@ def test_a_location_that_the_machine_does_not_have_is_refused(shop: Shop) -> Non
     shop.call("PATCH", f"/characteristics/{shop.characteristic}", parameters={"R10": 48}, reason="turret with 48")
     assert shop.read(7)["correction"]["tool_memory"] == 48
     shop.call("PATCH", f"/machines/{shop.machine}", 422, type="robot", tool_locations=0)
+
+
+def test_lists_to_choose_from_leave_none_out(session: Session) -> None:
+    session.execute(
+        text(
+            "INSERT INTO machine (key, name, control, type) "
+            "SELECT 'lathe-' || n, 'Lathe ' || n, 'sinumerik', 'lathe' FROM generate_series(1, 1200) AS n"
+        )
+    )
+    assert len(machines(session)) == 1200
+    assert len(machines(session, limit=25)) == 25

@@ -96,7 +96,7 @@ def _unusable(error: Unusable) -> Invalid:
 
 def guess(session: Session, found: Sequence[Content]) -> dict[int, str]:
     """The characteristics here that those of the file are, as far as it is known."""
-    known = characteristic_queries.characteristics(session, limit=100_000)
+    known = characteristic_queries.characteristics(session)
     return matching.guessed(found, known, remembered(session))
 
 
@@ -249,7 +249,7 @@ def _store_all(
     entries: list[tuple[Entry, Content, bool]] = []
     taken: dict[str, int] = {}
     if NEW in chosen.values():
-        known = characteristic_queries.characteristics(session, limit=100_000)
+        known = characteristic_queries.characteristics(session)
         taken = dict.fromkeys((each.characteristic.key for each in known), 1)
     for index, content in wanted.items():
         created = chosen[index] == NEW

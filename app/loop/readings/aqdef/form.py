@@ -72,7 +72,7 @@ def look(database: Database, upload: Upload, said: Mapping[str, str], characteri
     with database.sessions() as session:
         form.known = [
             (each.characteristic.key, f"{each.characteristic.name} · {each.machine.name}")
-            for each in characteristics.characteristics(session, limit=100_000)
+            for each in characteristics.characteristics(session)
         ]
         form.machines = [(each.key, each.name) for each in machines.machines(session)]
     try:

@@ -86,7 +86,7 @@ def _start(
             ("", _("Several: a column for each")),
             *(
                 (current.characteristic.key, f"{current.characteristic.name} · {current.machine.name}")
-                for current in characteristics.characteristics(session, limit=100_000)
+                for current in characteristics.characteristics(session)
             ),
         ],
         chosen=characteristic,
@@ -189,7 +189,7 @@ def _aqdef_preview(
 def _wide_preview(request: Request, upload: Upload, said: Mapping[str, str], *, status: int) -> Response:
     """The preview of a wide sheet: a characteristic for each column, guessed by its name until somebody has chosen."""
     with _database(request).sessions() as session:
-        known = characteristics.characteristics(session, limit=100_000)
+        known = characteristics.characteristics(session)
     layout: Layout | None = None
     trouble: InbandError | None = None
     shown: list[PreviewLine] = []

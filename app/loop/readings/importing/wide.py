@@ -169,7 +169,7 @@ def _with_new(
     if all(column.characteristic != NEW for column in columns):
         return list(columns)
     described = {each.index: each for each in drawn.contents(layout)}
-    taken = {each.characteristic.key: 1 for each in characteristics.characteristics(session, limit=100_000)}
+    taken = {each.characteristic.key: 1 for each in characteristics.characteristics(session)}
     made = []
     for column in columns:
         if column.characteristic == NEW:
@@ -237,7 +237,7 @@ def columns_named(pairs: Iterable[tuple[str, str]], layout: Layout) -> list[Colu
 def columns_known(database: Database, layout: Layout) -> list[Column]:
     """The names in the rows that are keys or names of characteristics here."""
     with database.sessions() as session:
-        known = characteristics.characteristics(session, limit=100_000)
+        known = characteristics.characteristics(session)
         return [Column(place, key) for place, key in columns_by_name(layout, known).items()]
 
 
