@@ -371,6 +371,7 @@ class Server:
     start: Callable[[], Process]
     stderr: Path
     _clients: list[httpx.Client] = field(default_factory=list)
+    _kept: list[httpx.Client] = field(default_factory=list)
 
     def client(self, key: str | None = None, **headers: str) -> httpx.Client:
         """An HTTP client of this server; with ``key`` it calls as that key's owner."""
@@ -409,12 +410,19 @@ class Server:
         """After ``kill`` or ``stop``: the same address, the same database."""
         self.process = self.start()
 
+    def keep(self, *clients: httpx.Client) -> None:
+        """These are of all files: `hang_up` leaves them open."""
+        self._kept += clients
+
     def hang_up(self) -> None:
         """Close the clients that were given out."""
-        while self._clients:
-            self._clients.pop().close()
+        for client in self._clients:
+            if client not in self._kept:
+                client.close()
+        self._clients = list(self._kept)
 
     def close(self) -> None:
+        self._kept.clear()
         self.hang_up()
         if self.process.poll() is None:
             self.process.terminate()

@@ -12,4 +12,5 @@ def story(common_server: Server) -> Shop:
     """Six hundred readings with everything a report may hold; nobody changes anything there."""
     shop = Shop(common_server)
     told(shop)
+    common_server.keep(shop.admin, shop.machine_client)
     return shop
