@@ -84,7 +84,7 @@ class InProcess(Server):
     def __init__(self, database: Database, transport: httpx.BaseTransport, app: FastAPI) -> None:
         self.url, self.database = "http://inband.test", database
         self.transport, self.app = transport, app
-        self._clients = []
+        self._clients, self._kept = [], []
 
     def client(self, key: str | None = None, **headers: str) -> httpx.Client:
         """As `Server.client`."""
