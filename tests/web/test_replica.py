@@ -177,6 +177,7 @@ def test_one_that_is_away_is_not_missed(followed: Shop, server: Server, servers:
     until(lambda: BEHIND in ask(followed).headers)
 
 
+@pytest.mark.long
 def test_a_query_that_it_ends_is_answered_by_the_other(followed: Shop, servers: Cluster) -> None:
     """As when what it reads is about to be cleaned away (a conflict with recovery)."""
     waiting = "FROM pg_stat_activity WHERE wait_event_type = 'Lock' AND application_name = 'inband'"
