@@ -106,6 +106,7 @@ class TestWriting:
         engineer.sign_in(page)
         page.context.grant_permissions(["clipboard-read", "clipboard-write"])
         page.goto(f"/setup/characteristics/{shop.characteristic}")
+        page.get_by_role("link", name="Program text", exact=True).last.click()  # which opens what is folded
         area = page.get_by_label("Measuring program of this characteristic")
         page.get_by_role("button", name="Copy").click()
         expect(page.get_by_role("button", name="Copied")).to_be_visible()
