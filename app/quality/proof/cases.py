@@ -12,7 +12,7 @@ FOLDER = Path(__file__).parent / "cases"
 
 
 class Basis(StrEnum):
-    """Source of the expected numbers: an example counts as published only if somebody has opened what it cites."""
+    """Source of the expected numbers: an example counts as published only if what it cites was opened."""
 
     PUBLISHED = "published"
     DERIVED = "derived"
