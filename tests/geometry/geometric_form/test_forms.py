@@ -169,11 +169,15 @@ class TestKept:
 
 class TestReadings:
     def test_a_result_becomes_a_reading_whose_zones_and_alarms_work(self, shop: Shop) -> None:
+        """Set up as the how-to says: the tolerance is the upper deviation, so a little more than it is out."""
         flat = f"{shop.characteristic}-flat"
         shop.add(
             flat,
-            target=0.0,
-            tolerance_width=0.008,
+            target=None,
+            tolerance_width=None,
+            nominal=0.0,
+            upper_deviation=0.004,
+            lower_deviation=0.0,
             averaging_limit=0.003,
             mode="measure_only",
             tool_memory=0,
@@ -189,6 +193,8 @@ class TestReadings:
         post(shop, **(PLATE | {"points": warped}), characteristic=flat)
         assert shop.call("GET", f"/readings/{flat}/2")["measured"] == pytest.approx(0.005)
         assert len(shop.alarms()) > before
+        assert shop.call("GET", f"/readings/{flat}/2")["zone"] == "out_of_tolerance"
+        assert shop.call("GET", f"/characteristics/{flat}")["parameters"]["natural_limit"] == "lower"
 
     def test_only_of_a_characteristic_of_this_machine(self, server: Server, common_shop: Shop) -> None:
         other = Shop(server)
