@@ -187,6 +187,17 @@ class TestEveryDocument:
             ]
         assert seen == set(generate.documents())
 
+    def test_pip_is_given_no_name_that_anybody_can_register(self) -> None:
+        """No distribution of Inband is at PyPI: wherever one is installed, in documents and in messages, by its file."""
+        by_name = re.compile(
+            r"""(?:pip\ install[^\n`]*[\ "']|\bInstall\ `?)inband(?:[-_](?:bridge|client|simulators))?(?=[\s"'`,.[]|$)""",
+            re.VERBOSE,
+        )
+        texts = [*generate.documents(), *(HOUSE / "app").rglob("*.md"), *(HOUSE / "app").rglob("*.py")]
+        for path in (*texts, *(HOUSE / "frontend" / "templates").rglob("*.html")):
+            found = [line for line in path.read_text().splitlines() if by_name.search(line)]
+            assert [line for line in found if "what anybody puts there" not in line] == [], path
+
     def test_paths_of_the_tree_exist(self) -> None:
         for path in generate.documents():
             for named in re.findall(r"`((?:app|tests|docs|bench|frontend|migrations)/[\w./-]*)`", path.read_text()):

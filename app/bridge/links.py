@@ -6,7 +6,13 @@ Lengths are mm in Inband's sense on this side: a kind, or `app.bridge.registers`
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import Any, ClassVar, Protocol
+from typing import Any, ClassVar, Final, Protocol
+
+LIBRARIES: Final = (
+    "pip install --require-hashes -r libraries-of-the-bridge.txt (beside the server: libraries-with-extras.txt)"
+)
+"""How to install what a kind needs beyond the usual: from the files beside the wheel. No name of Inband is registered at PyPI,
+so by name pip would install what anybody puts there."""
 
 
 class LinkError(Exception):

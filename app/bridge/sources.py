@@ -16,7 +16,7 @@ import msgspec
 from msgspec import Meta
 
 from app.bridge.configuration import Machine
-from app.bridge.links import Clock, ControlAway, LinkError, Misconfigured, OneWay, Position, Received
+from app.bridge.links import LIBRARIES, Clock, ControlAway, LinkError, Misconfigured, OneWay, Position, Received
 from app.bridge.moments import START
 
 HELD = 256 * 1024  # bytes that may wait for the next poll; then the sender has to
@@ -197,9 +197,7 @@ class SerialPort(One[L]):
         try:
             import serial
         except ModuleNotFoundError as error:
-            raise Misconfigured(
-                "A serial port needs pyserial, which is not installed. Install inband-bridge[serial], or inband[serial]."
-            ) from error
+            raise Misconfigured(f"A serial port needs pyserial, which is not installed: {LIBRARIES}") from error
         settings = self.settings
 
         def opened(framing: str) -> Any:

@@ -280,12 +280,12 @@ def certificate(
     """Make the certificate and the key with which the bridge shows itself to OPC UA controls."""
     from socket import gethostname
 
+    from app.bridge.links import LIBRARIES
+
     try:
         from app.bridge.certificates import write_pair
     except ModuleNotFoundError as error:
-        raise InbandError(
-            f"{error.name} is not installed.", "Install inband-bridge[opcua], or inband[opcua]."
-        ) from error
+        raise InbandError(f"{error.name} is not installed.", f"{LIBRARIES}.") from error
     try:
         public, key, uri = write_pair(folder, host or gethostname())
     except FileExistsError as error:

@@ -10,6 +10,8 @@ from importlib import import_module
 from types import ModuleType
 from typing import Final
 
+from app.bridge.links import LIBRARIES
+
 KINDS: Final[dict[str, str]] = {
     "dprnt": "app.bridge.kinds.dprnt",
     "folder": "app.bridge.kinds.folder",
@@ -20,8 +22,8 @@ KINDS: Final[dict[str, str]] = {
     "text": "app.bridge.kinds.text",
 }
 """Names and modules."""
-EXTRAS: Final = {"opcua": "opcua", "mqtt": "mqtt", "heidenhain": "heidenhain"}
-"""Kinds that need an extra of the package."""
+EXTRAS: Final = {"opcua", "mqtt", "heidenhain"}
+"""Kinds that need a library of an extra."""
 
 
 class KindError(ValueError):
@@ -44,6 +46,4 @@ def kind_named(name: str) -> ModuleType:
     except ModuleNotFoundError as error:
         if name not in EXTRAS:
             raise
-        raise KindError(
-            f"kind = {name!r} needs {error.name}, which is not installed. Install inband-bridge[{EXTRAS[name]}], or inband[{EXTRAS[name]}]."
-        ) from error
+        raise KindError(f"kind = {name!r} needs {error.name}, which is not installed: {LIBRARIES}") from error

@@ -18,7 +18,8 @@ MAIL = re.compile(r"[A-Za-z0-9.!#$%&'*+/=?^_`{|}~-]{1,64}@[A-Za-z0-9]([A-Za-z0-9
 NAT64 = IPv6Network("64:ff9b::/96")
 INSIDE = [IPv6Network(each) for each in ("::/16", "64:ff9b:1::/48", "fec0::/10")]
 """Addresses that lead into the own network, though `is_global` holds for some of them."""
-APPRISE = "pip install inband[notify]"
+APPRISE = "pip install --require-hashes -r libraries-with-extras.txt"
+"""The file is beside Inband's wheel. The name inband is not registered at PyPI: pip would install what anybody puts there."""
 LOOK_UP = 2.0
 """Seconds that a request waits for the name service."""
 _LOOKING = BoundedSemaphore(8)

@@ -885,7 +885,7 @@ class TestApprise:
     def test_where_it_is_missing_it_says_how_to_install_it(self, monkeypatch: pytest.MonkeyPatch) -> None:
         monkeypatch.setitem(sys.modules, "apprise", None)
         job = Job(1, 1, "test", "apprise", "ntfy://topic", None, Message("Test", "Text"))
-        assert "pip install inband[notify]" in run(deliver(job, self.PERMITTED)).text
+        assert "pip install --require-hashes -r libraries-with-extras.txt" in run(deliver(job, self.PERMITTED)).text
 
     def test_it_is_given_the_message(self, monkeypatch: pytest.MonkeyPatch) -> None:
         sent: list[Any] = []
