@@ -38,8 +38,8 @@ class Caller:
         if self.role is None:
             raise NotAllowed(
                 _(
-                    "The key of machine {machine} may only push readings of that machine, and handle its corrections, tools, "
-                    "averages, calibrations and pairs."
+                    "The key of machine {machine} may only read what belongs to that machine, and send what the machine itself "
+                    "measures, applies and reports: nothing that a person decides or sets up."
                 ).format(machine=self.machine),
                 _("Use the key or the sign-in of a person for this."),
             )
@@ -53,7 +53,7 @@ class Caller:
     def must_at(self, machine_id: int, role: Role) -> None:
         """Raises `NotAllowed` unless this is that machine's own key, or somebody with the role.
 
-        For what a machine does itself: readings, corrections, tools, averages, and looking at its own set-up.
+        For what a machine does itself: what it measures, applies and reports, and looking at its own set-up.
         """
         if self.machine_id is None:
             self.must(role)
