@@ -54,6 +54,8 @@ def commands() -> Iterator[tuple[str, Any]]:
     def walk(group: Any, words: list[str]) -> Iterator[tuple[str, Any]]:
         for name, command in sorted(group.commands.items()):
             if hasattr(command, "commands"):
+                if command.invoke_without_command:
+                    yield " ".join([*words, name]), command
                 yield from walk(command, [*words, name])
             else:
                 yield " ".join([*words, name]), command

@@ -13,7 +13,7 @@ chipped edge, a slipped part), after which on average (n - 1) / 2 parts go out b
 Stat. Assoc. 51, 228: the process shifts at random between two samples). Of k events in N readings r = (k + 1/2) / (N + 1), the
 posterior mean of Jeffreys' prior: none in a thousand readings is no proof that none comes.
 
-More than every part is measured only of a process that is known well, stable and capable (`Hindrance`). Lengths are mm.
+Fewer than every part are measured only where the process is well known, stable and capable (`Hindrance`). Lengths are mm.
 """
 
 from enum import StrEnum
