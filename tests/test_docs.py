@@ -228,7 +228,34 @@ class TestReference:
             generate.renewed("<!-- generated: nothing-like-it -->\n<!-- end -->")
 
 
+# Pages whose words in italics are mostly those of files and programs of others.
+OTHERS_WORDS = re.compile(r"bridge|import-readings|aqdef")
+# Examples of what a shop calls its machines and parts.
+NOT_OURS = {"Milling machine 1", "SN-0004", "SN-0005", "SN-0006", "SN-0007"}
+CONTROL = re.compile(r"(?<!\*)\*([A-Z][^*\n]{1,60})\*(?!\*)")
+
+
+def sentences_of_the_program() -> str:
+    """Templates and code in small letters, strings that follow each other joined, what is filled in as `n`."""
+    paths = [*(HOUSE / "frontend" / "templates").rglob("*.html"), *(HOUSE / "app").rglob("*.py")]
+    text = re.sub(r'"\s*\n\s*"', "", "\n".join(path.read_text() for path in paths))
+    return re.sub(r"%\(\w+\)s|{\w+}", "n", text).lower()
+
+
 class TestHowTo:
+    def test_buttons_and_pages_are_named_as_the_program_names_them(self) -> None:
+        """Words in italics with a capital are what stands on a page: each begins a sentence there."""
+        program, missing = sentences_of_the_program(), []
+        for path in (HOUSE / "docs" / "how-to").glob("*.md"):
+            if OTHERS_WORDS.match(path.stem):
+                continue
+            for named in CONTROL.findall(re.sub(r"```.*?```", "", path.read_text(), flags=re.DOTALL)):
+                shown = re.sub(r"(?<![a-z\d])[+−-]?\d+([.,]\d+)?( µm)?", "n", named.lower().rstrip(" .…"))
+                ways = ([shown], shown.split(" → "), re.split(" → |: ", shown), re.split(" → |: |, ", shown))
+                known = any(all(re.search(rf"[\"']{re.escape(part)}", program) for part in way) for way in ways)
+                missing += [] if known or named in NOT_OURS else [f"{path.name}: {named}"]
+        assert missing == [], "name it as the page does"
+
     def test_the_python_client_closes_a_loop_as_it_is_written(self, server: Server) -> None:
         path = HOUSE / "docs" / "how-to" / "python-client.md"
         loop, live = (
