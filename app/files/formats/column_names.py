@@ -10,11 +10,13 @@ from app.files.formats.cell_values import LONGEST_NAME, folded
 
 UPPER_LIMITS = (
     "upper limit", "usl", "upper spec", "upper specification limit", "max size", "obere grenze", "oberer grenzwert", "ogw",
-    "gornja granica", "zgornja meja", "верхний предел",
+    "gornja granica", "zgornja meja", "верхний предел", "limite supérieure", "limite superiore", "límite superior", "górna granica",
+    "horní mez", "felső határ", "felső tűréshatár",
 )  # fmt: skip
 LOWER_LIMITS = (
     "lower limit", "lsl", "lower spec", "lower specification limit", "min size", "untere grenze", "unterer grenzwert", "ugw",
-    "donja granica", "spodnja meja", "нижний предел",
+    "donja granica", "spodnja meja", "нижний предел", "limite inférieure", "limite inferiore", "límite inferior", "dolna granica",
+    "dolní mez", "alsó határ", "alsó tűréshatár",
 )  # fmt: skip
 """Names of columns that hold a limit as a size; *upper* and *lower* by any other name are deviations from the nominal size."""
 UPPER_OF_EITHER = ("upper", "up", "oben", "ober", "obere", "gornja", "zgornja", "верх", "верхний")
@@ -94,8 +96,11 @@ NAMES: dict[str, tuple[str, ...]] = {
         "部品番号", "ワーク番号", "シリアル番号", "零件号", "工件号", "序列号",
     ),
     "characteristic": (
-        "characteristic", "characteristic name", "feature", "feature name", "merkmal", "merkmalsname", "karakteristika",
-        "znacilnost", "карактеристика", "характеристика",
+        "characteristic", "characteristic name", "characteristic id", "characteristic no", "characteristic number", "feature", "feature name",
+        "merkmal", "merkmalsname", "merkmal nr", "merkmalnr", "merkmalsnummer", "merkmalbezeichnung", "merkmalsbezeichnung", "prüfmerkmal",
+        "messmerkmal", "karakteristika", "znacilnost", "карактеристика", "характеристика",
+        "caractéristique", "caratteristica", "característica", "cecha", "charakterystyka", "charakteristika", "znak", "jellemző", "kenmerk",
+        "egenskap", "özellik", "karakteristik", "caracteristică", "značajka", "特性", "測定項目", "특성",
     ),
     "unit": (
         "unit", "units", "uom", "einheit", "masseinheit", "jedinica", "merna jedinica", "enota", "merska enota",
@@ -103,15 +108,21 @@ NAMES: dict[str, tuple[str, ...]] = {
     ),
     "nominal": (
         "nominal", "nominal value", "nominal size", "nom", "design value", "soll", "sollwert", "sollmass", "nennmass", "nominalna vrednost", "nazivna mera",
-        "номинал", "номинальное значение",
+        "номинал", "номинальное значение", "nominale", "cote nominale", "valeur nominale", "valore nominale", "quota nominale",
+        "valor nominal", "wartość nominalna", "wymiar nominalny", "jmenovitá hodnota", "jmenovitý rozměr", "névleges", "névleges érték",
+        "névleges méret",
     ),
     "upper": (
         "uppertol", "upper tol", "up tol", "uptol", "upper limit tol", "ob tol", "obere tol", "upper tolerance", "upper deviation", "+tol", "plus tol", "oberes abmass", "obere toleranz",
-        "gornje odstupanje", "zgornje odstopanje", "верхнее отклонение", *UPPER_LIMITS, *UPPER_OF_EITHER,
+        "gornje odstupanje", "zgornje odstopanje", "верхнее отклонение", "tol sup", "tolérance supérieure", "écart supérieur",
+        "tolleranza superiore", "tolerancia superior", "tolerância superior", "horní tolerance", "horní úchylka", "felső tűrés",
+        "górna odchyłka", *UPPER_LIMITS, *UPPER_OF_EITHER,
     ),
     "lower": (
         "lowertol", "lower tol", "low tol", "lowtol", "lower limit tol", "un tol", "unt tol", "untere tol", "lower tolerance", "lower deviation", "unteres abmass", "untere toleranz",
-        "donje odstupanje", "spodnje odstopanje", "нижнее отклонение", *LOWER_LIMITS, *LOWER_OF_EITHER,
+        "donje odstupanje", "spodnje odstopanje", "нижнее отклонение", "tol inf", "tolérance inférieure", "écart inférieur",
+        "tolleranza inferiore", "tolerancia inferior", "tolerância inferior", "dolní tolerance", "dolní úchylka", "alsó tűrés",
+        "dolna odchyłka", *LOWER_LIMITS, *LOWER_OF_EITHER,
     ),
     "natural_limit": (
         "natural limit", "naturliche grenze", "prirodna granica", "naravna meja", "природна граница", "естественная граница",

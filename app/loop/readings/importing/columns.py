@@ -20,10 +20,17 @@ DATES = frozenset(map(key_of, (
 )))  # fmt: skip
 FEATURES = frozenset(map(key_of, ("feature", "feature name", "element", "element name", "geometrieelement")))
 NAMED = ("id", *map(key_of, (
-    "name", "dimension", "dimension name", "bezeichnung", "benennung", "naziv", "oznaka", "ime", "назив", "ознака", "наименование",
-    "название", "обозначение",
+    "name", "dimension", "dimension name", "dim", "balloon", "balloon no", "balloon number", "item", "label", "parameter",
+    "bezeichnung", "benennung", "messgröße", "messstelle", "naziv", "oznaka", "ime", "назив", "ознака", "наименование",
+    "название", "обозначение", "désignation", "dénomination", "libellé", "cote", "denominazione", "nome", "quota", "denominación",
+    "nombre", "cota", "denominação", "nazwa", "wymiar", "název", "označení", "rozměr", "megnevezés", "név", "méret", "benaming", "naam",
+    "benämning", "namn", "mått", "ad", "isim", "ölçü", "denumire", "nume", "cotă", "名称", "項目", "测量项目", "项目", "이름", "항목",
 )))  # fmt: skip
-"""Columns that name a characteristic beside its nominal size or limits; all but the first, a number of a row, without a time too."""
+"""Columns that name a characteristic beside its nominal size or limits; all but the first, a number of a row, without them too."""
+_OF_FRENCH = frozenset(
+    map(key_of, ("mesure", "mesuré", "valeur", "valeur mesurée", "cote mesurée", "valeur réelle", "cote réelle"))
+)
+"""Beside one of these a column *Nom* is that of names, not of nominal sizes."""
 AXES = frozenset({"axis", "ax", "achse", "osa", "os", "оса", "ось"})
 TIMES = frozenset(map(key_of, (
     "time", "zeit", "uhrzeit", "vreme", "cas", "време", "время", "vrijeme", "heure", "ora", "hora", "godzina", "czas", "idő", "időpont",
@@ -130,6 +137,8 @@ def is_tolerance(column: str) -> bool:
 def guesses_of(header: tuple[str, ...]) -> dict[str, tuple[int, ...]]:
     """The fields that the names of columns mean."""
     names = [key_of(name) for name in header]
+    if _OF_FRENCH & set(names):
+        names = ["name" if each == "nom" else each for each in names]
     guesses: dict[str, tuple[int, ...]] = {}
     for name, words in _WORDS.items():
         ranked = sorted((words.index(each), place) for place, each in enumerate(names) if each in words)
@@ -155,7 +164,7 @@ def guesses_of(header: tuple[str, ...]) -> dict[str, tuple[int, ...]]:
         guesses["characteristic"] += (beside,)  # a feature has several: X, Y, D
     elif "characteristic" not in guesses and "measured" in guesses:
         drawn = {"nominal", "upper", "lower"} & guesses.keys()
-        naming = NAMED if drawn else () if "measured_at" in guesses else NAMED[1:]  # beside a time it may be a person
+        naming = NAMED if drawn else NAMED[1:]  # of several persons or parts it is asked
         named = next((names.index(each) for each in naming if each in names), beside if drawn else None)
         guesses |= {} if named is None else {"characteristic": (named,)}
     if set(COLUMNS) <= set(header):

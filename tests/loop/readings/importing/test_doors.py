@@ -31,6 +31,7 @@ from app.core.parameters import read
 from app.errors import InbandError
 from app.files.aqdef.values import OF_CHARACTERISTIC as C
 from app.files.aqdef.values import OF_FIELD as F
+from app.files.formats.column_names import NAMES
 from app.loop.readings import exporting, queries, table_api
 from app.loop.readings.aqdef import actions as aqdef_actions
 from app.loop.readings.aqdef import content as aqdef_content
@@ -115,7 +116,7 @@ Date: 2025-03-15
 """
 UNIT = "Time;Run-out [{}]\n18.11.2025 06:05;0,10\n18.11.2025 06:06;0,12\n18.11.2025 06:07;0,08\n"
 THOUSANDS = "Time;D40 [µm]\n18.11.2025 06:05;1.250\n18.11.2025 06:06;1.251\n"
-US = "Date,Time,Measured\n11/18/2025,6:05:10 AM,40.001\n11/18/2025,6:06:10 PM,40.002\n"
+US = "Date,Time,Measured\n11/18/2025,6:05:10 AM,40.001\n11/18/2025,6:06:10 PM,40.002\n11/18/2025,12:06:10 AM,40.003\n"
 GERMAN = "Nr.;Datum;Uhrzeit;Sollmaß;Istmaß\n1;18.11.25;06:05:11;40,000;40,001\n2;18.11.25;06:06:12;40,000;39,998\n"
 TABLES = {
     "three": Case(THREE, morning(40.001, 40.002, 40.003)),
@@ -154,6 +155,13 @@ TABLES = {
         "Time;D40\n01.01.1970 00:00:00;40,001\n01.01.1970 00:00:00;40,002\n", [(40.001, None), (40.002, None)]
     ),
     "milliseconds": Case("Time,D40\n1763442300123,40.001\n", bad=(2,), words="milliseconds since 1970-01-01"),
+    "milliseconds that are named": Case(
+        "Time,D40\n1763442300123,40.001\n1763442360456,40.002\n",
+        [(40.001, "2025-11-18T05:05:00.123000"), (40.002, "2025-11-18T05:06:00.456000")],
+        cli={"time_format": "milliseconds since 1970-01-01"},
+        page={"time_format": "milliseconds since 1970-01-01"},
+        bridge={"times": "milliseconds since 1970-01-01"},
+    ),
     "heading again": Case(
         "Time;D40\n18.11.2025 06:05;40,001\nTime;D40\n18.11.2025 06:06;40,002\n", morning(40.001, 40.002)
     ),
@@ -180,6 +188,14 @@ TABLES = {
     ),
     "comma for both": Case(
         "Time,Value\n2025-11-18 06:05:00,40,001\n2025-11-18 06:06:00,40,002\n", bad=(2, 3), words="quotation marks"
+    ),
+    "comma for both that is said": Case(
+        "Time,Value\n2025-11-18 06:05:00,40,001\n2025-11-18 06:06:00,40,002\n",
+        bad=(2, 3),
+        words="quotation marks",
+        cli={"decimal": ","},
+        page={"decimal": "comma"},
+        bridge={"decimal": ","},
     ),
     "comma in quotes": Case(
         '"Time","Value"\n"2025-11-18 06:05:00","40,001"\n"2025-11-18 06:06:00","40,002"\n', morning(40.001, 40.002)
@@ -273,6 +289,19 @@ TABLES = {
     ),
     "mil": Case(UNIT.format("mil"), morning(0.00254, 0.003048, 0.002032), size="0", column="Run-out [mil]"),
     "µin": Case(UNIT.format("µin"), morning(2.54e-6, 3.048e-6, 2.032e-6), size="0", column="Run-out [µin]"),
+    **{
+        unit: Case(UNIT.format(unit), morning(*sizes), size="0", column=f"Run-out [{unit}]")
+        for unit, sizes in {
+            "thou": (0.00254, 0.003048, 0.002032),
+            "tenths": (0.000254, 0.0003048, 0.0002032),
+            "um": (0.0001, 0.00012, 0.00008),
+            "nm": (1e-7, 1.2e-7, 8e-8),
+        }.items()
+    },
+    "cm": Case(UNIT.format("cm"), morning(1.0, 1.2, 0.8), size="0.1", column="Run-out [cm]"),
+    "a quote far from the target": Case(
+        UNIT.format('"'), size="0.1", column='Run-out ["]', far=True, words="lies more than 1 mm"
+    ),
     "like rows": Case(
         "Time,D40\n2025-11-18 06:05,40.001\n2025-11-18 06:05,40.001\n2025-11-18 06:05,40.003\n",
         [(size, MORNING.format(5)) for size in (40.001, 40.001, 40.003)],
@@ -280,7 +309,9 @@ TABLES = {
     "sep line": Case("sep=;\r\nTime;D40\r\n18.11.2025 06:05;40,001\r\n", morning(40.001)),
     "sep line and mark": Case("\ufeffsep=,\r\nTime,D40\r\n2025-11-18 06:05,40.001\r\n", morning(40.001)),
     "utf-16": Case("Zeit\tWert\r\n18.11.2025 06:05:00\t40,001\r\n", morning(40.001), encoding="utf-16"),
-    "month first": Case(US, [(40.001, "2025-11-18T05:05:10"), (40.002, "2025-11-18T17:06:10")]),
+    "month first": Case(
+        US, [(40.001, "2025-11-18T05:05:10"), (40.002, "2025-11-18T17:06:10"), (40.003, "2025-11-17T23:06:10")]
+    ),
     "two digits of a year": Case(
         GERMAN,
         [(40.001, "2025-11-18T05:05:11"), (39.998, "2025-11-18T05:06:12")],
@@ -651,7 +682,7 @@ def test_a_name_beside_a_nominal_size_or_limits_is_the_characteristics(tmp_path:
     )
     assert look(path, Wishes()).names == ("A",)
     path.write_text("Time,Name,Actual\n2025-11-18 06:05,Ana,40.001\n")
-    assert look(path, Wishes()).names == (), "alone it may be a person"
+    assert look(path, Wishes()).names == ("Ana",), "a person, perhaps: of several it is asked"
 
 
 def test_characteristics_side_by_side_below_their_name_are_no_rows_of_limits(plant: Plant, tmp_path: Path) -> None:
@@ -905,9 +936,21 @@ def test_letters_that_are_guessed_are_shown_with_a_name(plant: Plant, tmp_path: 
         assert [row["part"] for row in exporting.rows(session, entry)] == ["Ψ1"]
 
 
-def test_of_a_name_and_a_value_a_row_each_is_of_the_characteristic_it_names(plant: Plant, tmp_path: Path) -> None:
-    path, key = tmp_path / "two.csv", plant.shop.another("bore", **D40)
-    text = "Name;Value\nBore;40.001\nShaft;40.002\n"
+@pytest.mark.parametrize("head", ["Name;Value", "Time;Name;Value", "Value;Dimension;Date", "Merkmal;Wert;Zeit"])
+def test_of_a_name_and_a_value_a_row_each_is_of_the_characteristic_it_names(
+    plant: Plant, tmp_path: Path, head: str
+) -> None:
+    path, key, columns = tmp_path / "two.csv", plant.shop.another("bore", **D40), head.split(";")
+    moments = iter(range(5, 9))
+
+    def line(name: str, size: str) -> str:
+        at = f"18.11.2025 06:0{next(moments)}"
+        cells = {"Value": size, "Wert": size, "Time": at, "Zeit": at, "Date": at}
+        return ";".join(cells.get(column, name) for column in columns) + "\n"
+
+    text = f"{head}\n" + line("Bore", "40.001") + line("Shaft", "40.002")
+    place = next(at for at, column in enumerate(columns, 1) if column in {"Name", "Dimension", "Merkmal"})
+    measured = next(at for at, column in enumerate(columns, 1) if column in {"Value", "Wert"})
     path.write_text(text)
     answer = plant.table(path, text, characteristic=key)
     for ask in (plant.command(path, characteristic=key), plant.page(path, key), str(answer)):
@@ -922,10 +965,49 @@ def test_of_a_name_and_a_value_a_row_each_is_of_the_characteristic_it_names(plan
     assert [size for size, _at in plant.stored(key)] == [40.001], "its own row only"
     other = plant.shop.another("serial", **D40)
     path.write_text(text)
-    assert plant.page(path, other, column_characteristic="", column_part="1", column_measured="2") == ""
+    said = {"column_characteristic": "", "column_part": str(place), "column_measured": str(measured)}
+    assert plant.page(path, other, **said) == ""
     assert [size for size, _at in plant.stored(other)] == [40.001, 40.002], "where the names are those of parts"
+
+
+def test_a_number_of_a_row_is_no_name(tmp_path: Path) -> None:
+    path = tmp_path / "a.csv"
     path.write_text("ID;Value\n1;40.001\n2;40.002\n")
-    assert look(path, Wishes()).names == (), "a number of a row is no name"
+    assert look(path, Wishes()).names == ()
+
+
+@pytest.mark.parametrize(
+    "head",
+    [
+        *("Feature,Actual,Nominal", "Actual,Name", "Value,Time,Characteristic", "Balloon No.,Measured", "Item;Value"),
+        *("Prüfmerkmal;Messwert", "Messgröße;Wert;Datum", "Zeit;Bezeichnung;Istmaß", "Datum;Merkmal Nr.;Ist"),
+        *("Date;Caractéristique;Valeur", "Date;Cote;Valeur mesurée", "Nom;Valeur", "Désignation;Mesure;Heure"),
+        *("Datum;Znak;Naměřená hodnota", "Název;Hodnota", "Čas;Rozměr;Skutečná hodnota"),
+        *("Dátum;Jellemző;Mért érték", "Megnevezés;Érték", "Méret;Mért érték;Idő"),
+        *("Cecha;Wartość zmierzona", "Data;Nazwa;Pomiar", "Caratteristica;Valore", "Data;Quota;Misura"),
+        *("Característica;Medición", "Nombre;Valor", "Kenmerk;Meetwaarde", "Egenskap;Mätvärde", "Özellik;Değer"),
+        *("Denumire;Valoare", "Značajka;Vrijednost", "測定項目,測定値", "特性,测量值", "항목,측정값"),
+    ],
+)
+def test_the_column_of_names_is_known_as_the_value_beside_it(tmp_path: Path, head: str) -> None:
+    path, sign = tmp_path / "a.csv", ";" if ";" in head else ","
+    values = {"actual", "value", "measured", *map(str.casefold, NAMES["measured"])}
+
+    def cell(column: str, name: str) -> str:
+        column = column.casefold()
+        if column in values:
+            return "16.001"
+        if column == "nominal":
+            return "16"
+        return (
+            "2025-11-18"
+            if column in {"time", "date", "zeit", "datum", "heure", "čas", "dátum", "idő", "data"}
+            else name
+        )
+
+    rows = (sign.join(cell(column, name) for column in head.split(sign)) for name in ("Bore 1", "Bore 2"))
+    path.write_text("\n".join((head, *rows, "")), encoding="utf-8")
+    assert look(path, Wishes()).names == ("Bore 1", "Bore 2")
 
 
 def described(*lines: str) -> list[str]:
@@ -942,6 +1024,10 @@ Q_DAS = f"{F}{F}#{F}0{F}0{F}0{F}{F}0{F}{F}"
 AQDEF: dict[str, tuple[list[str], Readings]] = {
     "12 fields": (
         described(*(row(20 + at / 1000, f"18.11.2025/06:0{5 + at}:00", Q_DAS) for at in range(3))),
+        morning(20.0, 20.001, 20.002),
+    ),
+    "11 fields": (
+        described(*(row(20 + at / 1000, f"18.11.2025/06:0{5 + at}:00", Q_DAS.removesuffix(F)) for at in range(3))),
         morning(20.0, 20.001, 20.002),
     ),
     "12 fields and K2004": (described("K2004/1 0", row(20.001, SIX, Q_DAS)), morning(20.001)),
@@ -980,7 +1066,10 @@ AQDEF: dict[str, tuple[list[str], Readings]] = {
 
 @pytest.mark.parametrize(
     "name",
-    [pytest.param(name, marks=pytest.mark.long if name in {"12 fields and K2004", "1992"} else ()) for name in AQDEF],
+    [
+        pytest.param(name, marks=pytest.mark.long if name in {"11 fields", "12 fields and K2004", "1992"} else ())
+        for name in AQDEF
+    ],
 )
 def test_aqdef_means_the_same_at_every_door(plant: Plant, tmp_path: Path, name: str) -> None:
     lines, good = AQDEF[name]
