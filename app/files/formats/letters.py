@@ -55,7 +55,7 @@ _FOREIGN = {
         re.IGNORECASE,
     ),
     "eastern": re.compile(
-        r"ľ(?=[eií])|[čć](?=c)|(?<=[aeiou])á(?:[aeiou]|(?![^\W\d_]))|(?<=[bcdfghjklmnpqstvwxz])[čć](?=[bcdfghjklmnpqstvwxz])",
+        r"ľ(?=[eií])|(?<![^\W\d_])ľ(?:m|in)(?![^\W\d_])|[čć](?=c)|(?<=[aeiou])á(?:[aeiou]|(?![^\W\d_]))|(?<=[bcdfghjklmnpqstvwxz])[čć](?=[bcdfghjklmnpqstvwxz])",
         re.IGNORECASE,
     ),
     "cyrillic": re.compile(r"\b[ъыь]", re.IGNORECASE),
@@ -69,6 +69,8 @@ MOST_LINES = 500
 MOST = 100_000  # bytes of them
 _WHOLE_LETTERS = re.compile(rb"[\x00-\xff]*[\x00-\x3f]")  # no letter of two bytes is cut there
 LONGEST_OF_ONE = 2  # letters of a word that may have no Latin letter among them
+_MICRO = re.compile(r"(?<![^\W\d_])µ(?=(?:m|in)(?![^\W\d_]))")
+"""The sign of µm, which is a letter in other encodings."""
 _SIGNS = re.compile("[" + re.escape(_SIGNS_OF_ALL) + "]")
 _STRANGE = re.compile("[^\x00-\x7f\\w" + re.escape(_SIGNS_OF_ALL) + "¼½¾¿¡©®™№•‹›]")
 CLEARLY = 1.5  # common letters more that another script has to have
@@ -103,6 +105,8 @@ def guessed(content: bytes) -> tuple[str, bool]:
         whole = _WHOLE_LETTERS.match(lines[:MOST])
         lines = whole[0] if whole else lines[:MOST]
     texts = {name: lines.decode(name, "replace") for name in LETTERS}
+    if _MICRO.search(texts["cp1252"]) and _SIGNS.sub("", _MICRO.sub("", texts["cp1252"])).isascii():
+        return "cp1252", True
     best = max(LETTERS, key=lambda name: (_is_of_a_language(texts[name], name), _fit(texts[name], LETTERS[name])))
     if not _is_of_a_language(texts[best], best):
         others = {name: lines.decode(name, "replace") for name in LANGUAGES if name not in LETTERS}

@@ -20,7 +20,7 @@ DATES = frozenset(map(key_of, (
 )))  # fmt: skip
 FEATURES = frozenset(map(key_of, ("feature", "feature name", "element", "element name", "geometrieelement")))
 NAMED = ("id", *map(key_of, (
-    "name", "dimension", "dimension name", "dim", "balloon", "balloon no", "balloon number", "item", "label", "parameter",
+    "name", "dimension", "dimension name", "dim", "size", "maß", "mera", "mere", "mjera", "мера", "размер", "balloon", "balloon no", "balloon number", "item", "label", "parameter",
     "bezeichnung", "benennung", "messgröße", "messstelle", "naziv", "oznaka", "ime", "назив", "ознака", "наименование",
     "название", "обозначение", "désignation", "dénomination", "libellé", "cote", "denominazione", "nome", "quota", "denominación",
     "nombre", "cota", "denominação", "nazwa", "wymiar", "název", "označení", "rozměr", "megnevezés", "név", "méret", "benaming", "naam",
@@ -146,8 +146,11 @@ def guesses_of(header: tuple[str, ...]) -> dict[str, tuple[int, ...]]:
             guesses[name] = (ranked[0][1],)
     date = next((place for place, each in enumerate(names) if each in DATES), None)
     time = next((place for place, each in enumerate(names) if each in TIMES), None)
-    if date is not None and time is not None:
-        guesses["measured_at"] = (date, time)
+    moments = tuple(place for place in (date, time) if place is not None)
+    if (
+        len(moments) > 1 or "measured_at" not in guesses
+    ):  # also in languages whose words for both together are not known
+        guesses |= {"measured_at": moments} if moments else {}
     unsigned = [at for at, name in enumerate(header) if is_unsigned(name)]
     if "lower" not in guesses and unsigned:
         guesses["lower"] = (unsigned[0],)
@@ -165,7 +168,8 @@ def guesses_of(header: tuple[str, ...]) -> dict[str, tuple[int, ...]]:
     elif "characteristic" not in guesses and "measured" in guesses:
         drawn = {"nominal", "upper", "lower"} & guesses.keys()
         naming = NAMED if drawn else NAMED[1:]  # of several persons or parts it is asked
-        named = next((names.index(each) for each in naming if each in names), beside if drawn else None)
+        free = [each if (at,) != guesses["measured"] else "" for at, each in enumerate(names)]
+        named = next((free.index(each) for each in naming if each in free), beside if drawn else None)
         guesses |= {} if named is None else {"characteristic": (named,)}
     if set(COLUMNS) <= set(header):
         guesses |= {name: (header.index(name),) for name in (*ORIGIN, *VERDICT) if name in header}

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 from zoneinfo import ZoneInfo
 
+from app.core.number_text import number_or_none
 from app.errors import FieldError, Invalid
 from app.files.formats import cell_values, delimited, parts_across, spreadsheet
 from app.files.formats.cell_values import slashed
@@ -24,6 +25,8 @@ LONGEST_NAME = 1_000
 """Characters of a column's name, or a characteristic's: the page shows each a dozen times, and a cell may have 131,072."""
 NO_DIGIT = "*"
 MOST_NAMES = 1_000
+DIAMETERS = frozenset({"prumer", "priemer"})
+"""Words for a mean that are those for a diameter as well: Czech, Slovak."""
 
 
 @dataclass(frozen=True)
@@ -270,6 +273,10 @@ def _csv_layout(path: Path, wishes: Wishes, zone: ZoneInfo | None, kind: str = "
     _refuse_wide(header)
     first_line = max(head + 1, end + 1, wishes.first_line or 0)
     columns = columns_of(header, wishes.mapping)
+    if "measured" in columns and wishes.header_line is None and _is_size(header[columns["measured"][0]]):
+        # There is no heading: a person has said the columns by their places, and this line is a reading.
+        first_line, head = max(head, wishes.first_line or 0), 0
+        header = tuple(_("Column {n}").format(n=at) for at in range(1, len(header) + 1))
     place = columns.get("measured", (0,))[0]
     # Where no column is the measured one, it may be any of them, or several.
     only = slice(place, place + 1) if "measured" in columns else slice(None)
@@ -307,6 +314,16 @@ def _csv_layout(path: Path, wishes: Wishes, zone: ZoneInfo | None, kind: str = "
         (row.line, row.cells) for row in rows_of(path, made) if isinstance(row, Row) and tuple(row.cells) != header
     )
     return replace(_timed(made, _times(made, below, rows)), drawn=_drawn(made, named))
+
+
+def _is_size(name: str) -> bool:
+    """Tell of what stands in place of a name and is a size: a number with decimals.
+
+    >>> _is_size("40,001"), _is_size("40.001 mm"), _is_size("40"), _is_size("D40.5")
+    (True, True, False, False)
+    """
+    text = unit_behind(name)[0]
+    return not text.isdigit() and number_or_none(text) is not None
 
 
 def _letters(rows: Iterable[Row]) -> str:
@@ -381,7 +398,10 @@ def _drawn(layout: Layout, rows: Iterable[tuple[int, Sequence[Any]]]) -> dict[st
         name = named_in(cells, layout)
         if not name:
             continue
-        if not found and is_summary(name):
+        nominal, upper, lower, natural, unit = (
+            " ".join(written(cells[at]) for at in layout.columns.get(each, ())) for each in (*DRAWN, "unit")
+        )
+        if not found and is_summary(name) and not nominal and cell_values.folded(name) not in DIAMETERS:
             words = _(
                 "{name} holds limits or statistics: here the characteristics stand side by side, and their rows are parts. Say "
                 "so (--map characteristic=), and the first line of readings (--first-line)"
@@ -390,9 +410,6 @@ def _drawn(layout: Layout, rows: Iterable[tuple[int, Sequence[Any]]]) -> dict[st
             raise wrong(where, words.format(name=repr(name)))
         if len(name) > LONGEST_NAME:
             raise wrong(layout.named("characteristic") + ", " + _("line {line}").format(line=line), _long_name(name))
-        nominal, upper, lower, natural, unit = (
-            " ".join(written(cells[at]) for at in layout.columns.get(each, ())) for each in (*DRAWN, "unit")
-        )
         drawn = Drawn(line, nominal, upper, lower, natural, unit)
         first = found.setdefault(name, drawn)
         if not first.other and first[1:6] != drawn[1:6]:
