@@ -281,7 +281,9 @@ class TestEverythingOverAllOfThem:
     def test_the_statistics_count_every_one(self, client: httpx.Client, many_readings: Database) -> None:
         told = answered(client, f"/api/v1/characteristics/{KEY}/statistics", **WHOLE).json()
         deviations = np.array(stored(many_readings, "deviation"))[:, 0]
-        deviations = deviations[np.abs(deviations) < PARAMETERS["confidence_limit"]]  # a fault of the probe is no size
+        deviations = deviations[
+            np.abs(deviations) < PARAMETERS["confidence_limit"]
+        ]  # a fault of the probe is not a size
         assert told["count"] == MANY
         assert told["mean"] == pytest.approx(float(deviations.mean()), abs=1e-9)
 

@@ -26,7 +26,7 @@ FIELDS: Final = (
 EVERY: Final = "*"
 """The name in ``characteristics`` that stands for readings that name none."""
 TEMPERATURES: Final = FIELDS[-2:]
-"""Fields of the context, °C. What is no number is left out: no reading is lost to a sensor."""
+"""Fields of the context, °C. What is not a number is left out: no reading is lost to a sensor."""
 HIGHEST_NUMBER: Final = 2_147_483_647
 LONGEST_TEXT: Final = 128
 _CELSIUS: Final = ("°C", "ºC", "C")
@@ -95,7 +95,7 @@ class Form(NamedTuple):
         text = str(value).strip()
         if field not in TEMPERATURES or value is None or not text or self._degrees(text) is not None:
             return None
-        return f'is no number of °C, with decimal = "{self._decimal_in(text)}"; left out'
+        return f'is not a number of °C, with decimal = "{self._decimal_in(text)}"; left out'
 
     def _degrees(self, text: str) -> float | None:
         unit = next((each for each in _CELSIUS if text.endswith(each)), "")

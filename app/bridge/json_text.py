@@ -4,14 +4,14 @@ import json
 from typing import Any, Final
 
 LARGEST: Final = 1e18
-"""Of a number: more is no size, and may become infinite when it is converted."""
+"""Of a number: more is not a size, and may become infinite when it is converted."""
 
 
 def read_json(text: str | bytes) -> Any:
     """Read JSON.
 
     Raises `json.JSONDecodeError` or `UnicodeDecodeError` where it is no JSON, and `ValueError` with words that go behind a
-    name, such as “holds NaN, which is no number”.
+    name, such as “holds NaN, which is not a number”.
     """
     try:
         content = json.loads(text, parse_constant=_no_number, parse_float=_number, parse_int=_whole)
@@ -24,7 +24,7 @@ def read_json(text: str | bytes) -> Any:
 
 
 def _no_number(text: str) -> None:
-    raise ValueError(f"holds {text[:40]}, which is no number")
+    raise ValueError(f"holds {text[:40]}, which is not a number")
 
 
 def _number(text: str) -> float:

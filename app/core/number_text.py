@@ -20,7 +20,7 @@ LONGEST = 400
 
 
 class NumberFault(StrEnum):
-    """Reasons why a text is no number."""
+    """Reasons why a text is not a number."""
 
     EMPTY = "empty"
     BLANK = "blank"
@@ -33,7 +33,7 @@ class NumberFault(StrEnum):
 
 
 class NotANumber(ValueError):
-    """A text that is no number; ``fault`` says why."""
+    """A text that is not a number; ``fault`` says why."""
 
     def __init__(self, fault: NumberFault) -> None:
         super().__init__(fault.value)

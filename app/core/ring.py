@@ -54,7 +54,7 @@ SLOT_WEIGHTS: Final = {
 }
 MAIL_WEIGHTS: Final = {"number": 61, "value": 67, "expected": 71, "parameter": 73, "tool": 79, "edge": 83}
 LARGEST: Final = 1e12
-"""No number of a slot or of the mailbox is as large: what is, or is no number, was never written."""
+"""No number of a slot or of the mailbox is as large: what is, or is not a number, was never written."""
 INCH: Final = 25.4
 """mm in an inch."""
 

@@ -127,7 +127,7 @@ def by_field(error: InbandError, at: Callable[[str, str], tuple[str, str]] = lam
 
 
 def length(text: str | None) -> float | str | None:
-    """A length in mm as people type it, with a decimal point or comma; what is no number is left for the schema to refuse.
+    """A length in mm as people type it, with a decimal point or comma; what is not a number is left for the schema to refuse.
 
     >>> length(" 0,05 "), length("−0.5"), length(""), length("5 mm"), length("0. 001")
     (0.05, -0.5, None, '5 mm', '0. 001')

@@ -392,7 +392,7 @@ def _with_plan(made: Shop) -> None:
     cause = made.call("POST", "/reactions/catalogue", 201, sort="cause", name="Chip between the part and the jaws")[
         "id"
     ]
-    made.call("POST", "/reactions/catalogue", 201, sort="action", name="Insert turned")
+    made.call("POST", "/reactions/catalogue", 201, sort="action", name="Insert indexed")
     drawing = as_json(picture(size=(1200, 500)))
     shown = {"digest": made.call("POST", "/reactions/pictures", 201, **drawing)["digest"], "alt": "A chipped edge"}
     made.call("POST", f"/alarms/{made.alarms()[0]['id']}/photos", 201, **drawing)

@@ -486,7 +486,7 @@ def _name(code: int) -> str:
 
 def _number(value: object, identifier: str) -> float:
     if isinstance(value, bool) or not isinstance(value, int | float):
-        raise Misconfigured(f"{identifier} holds {value!r}, which is no number.")
+        raise Misconfigured(f"{identifier} holds {value!r}, which is not a number.")
     return float(value)
 
 

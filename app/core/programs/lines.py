@@ -234,7 +234,7 @@ def is_remark(block: str, rest: str) -> bool:
 
 
 def no_number(r: str, text: str) -> Note:
-    """The reason why what is assigned to a variable is no number: nothing there, a blank inside, or a calculation."""
+    """The reason why what is assigned to a variable is not a number: nothing there, a blank inside, or a calculation."""
     text = text.strip()
     if not text:
         return Note("no_value", {"r": r})

@@ -37,7 +37,7 @@ ENOUGH_FOR_PERCENTILES = 1000
 BELOW, ABOVE = 0.00135, 0.99865
 """The percentiles that take the place of -3 sigma and +3 sigma (ISO 22514-2: X0.135 % and X99.865 %)."""
 CAPABLE, VERY_CAPABLE = 1.33, 1.67
-"""What is usually asked for (ISO 22514-2, AIAG): four sigma to each limit, five for what matters to safety and of a machine."""
+"""What is usually asked for (ISO 22514-2, AIAG): four sigma to each limit, five for safety-critical characteristics and machine performance."""
 
 
 TINY = 1e-300

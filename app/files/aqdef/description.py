@@ -183,7 +183,7 @@ def open_text(path: Path, encoding: str) -> TextIO:
 def no_field(line: str) -> str:
     """The reason why a line that begins with K is none of a field."""
     if found := _BAD_INDEX.match(line):
-        return _("has an index that is no number ({index}); it is passed over").format(index=repr(found[1]))
+        return _("has an index that is not a number ({index}); it is passed over").format(index=repr(found[1]))
     return _("is too short or no K field; it is passed over")
 
 

@@ -133,7 +133,7 @@ def same_number(one: str, other: str) -> bool:
 
 
 def no_number(fault: NumberFault, decimal: str) -> str:
-    """Explain why a cell is no number, and what to do."""
+    """Explain why a cell is not a number, and what to do."""
     other = "." if decimal == "," else ","
     return {
         NumberFault.EMPTY: _("is empty; remove the line if the probe measured nothing"),

@@ -51,7 +51,7 @@ _ONLY_AS_WRITTEN: Final = {"nm": {"nm"}, "m": {"m"}, "mm": {"mm", "MM"}}
 """Units whose other cases are something else: Nm is a torque, M a million, Mm a million metres."""
 _BRACKETS: Final = re.compile(r"\[([^\[\]]*)\]|\(([^()]*)\)|<([^<>]*)>")
 _BEHIND: Final = re.compile(r"(.*\d[.,]?)\s*([^\d\s.,]{1,12})")
-LONGEST_SIZE: Final = 400  # characters; what is longer is no size
+LONGEST_SIZE: Final = 400  # characters; what is longer is not a size
 _LARGEST: Final = 1e300  # what is larger would become infinite
 _LAST_WORD: Final = re.compile(r"[_ ]([^_ ]+)$")
 _OTHER_SCALES: Final = {"f", "fahrenheit", "k", "kelvin", "r", "rankine", "℉"}

@@ -152,11 +152,11 @@ def comments(kind: str, action: str) -> list[str]:
 
 def _usual_comments(action: str) -> Sequence[str]:
     return {
-        "tool_replaced": [_("Insert turned"), _("New insert"), _("New tool"), _("Insert chipped")],
+        "tool_replaced": [_("Insert indexed"), _("New insert"), _("New tool"), _("Insert chipped")],
         "keep_cutting": [_("Edge looked at, still good"), _("Until the end of the batch"), _("Replaced at next stop")],
         "false_reading": [_("Chip on the stylus"), _("Coolant on the part"), _("Part not clamped right")],
         "sister_tool": [_("Edge worn"), _("Insert chipped"), _("Planned life reached")],
-        "measured_by_hand": [_("Micrometer"), _("Bore gauge"), _("Plug gauge"), _("Measuring machine")],
+        "measured_by_hand": [_("Micrometer"), _("Bore gauge"), _("Plug gauge"), _("CMM")],
         "noted": [_("Part set aside")],
     }.get(action, [])
 

@@ -105,7 +105,7 @@ SUGGESTION: Verb[OfPlace, SuggestionAcceptIn] = Verb(
     word=lambda: _("Accept"),
     title=lambda _on: _("Accept the empirical value?"),
     follows=_suggesting,
-    reasons=lambda: [_("Compared with the measuring machine"), _("Compared with a micrometer")],
+    reasons=lambda: [_("Compared with the CMM"), _("Compared with a micrometer")],
     hidden=_suggested,
     said=lambda: _("The empirical value is accepted: calibration {n}."),
 )

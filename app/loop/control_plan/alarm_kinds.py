@@ -60,8 +60,8 @@ MISSED = register(
         word=lambda: _("Measurement missed"),
         sentence=_sentence,
         what_to_do=lambda: _(
-            "Measure the next part; its reading ends this alarm. Look whether the probe is skipped in the program, or the gauge "
-            "is out of order. What was cut meanwhile is not measured."
+            "Measure the next part; its reading ends this alarm. Check whether the program skips the probing cycle, or the gauge "
+            "is out of order. Parts cut in the meantime have not been measured."
         ),
         icon="no_data",
         comments={"noted": lambda: [_("Probe was switched off"), _("Gauge out of order"), _("Set-up parts")]},

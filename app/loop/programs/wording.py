@@ -81,8 +81,8 @@ def note(said: Note) -> str:
         "cut_out": _("{r}: {name} cut out of {source}"),
         "as_number": _("{r} = {name} as a number"),
         "cut_wrong": _("{source}: ten characters from 0, 11, 22 or 33 are one number, not {length} from {begin}"),
-        "blank_in_number": _("{r}: {text} has a blank inside and is no number; the parameter is left out"),
-        "no_number": _("{r}: {text} is no number; the parameter is left out"),
+        "blank_in_number": _("{r}: {text} has a blank inside and is not a number; the parameter is left out"),
+        "no_number": _("{r}: {text} is not a number; the parameter is left out"),
         "unit_inch": _("{word}: lengths are in inches from here on, and become mm"),
         "unit_mm": _("{word}: lengths are in mm"),
         "unit_mixed": _(

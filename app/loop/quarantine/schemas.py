@@ -18,14 +18,14 @@ Guard = Annotated[
         strict=True,
         ge=0,
         le=1,
-        description="Expanded measuring uncertainty, mm: a part is certainly good where it keeps so far from each limit.",
+        description="Expanded measuring uncertainty, mm: a part is certainly good only if it clears each limit by at least this much.",
     ),
 ]
 ByHandOnly = Annotated[
     bool,
     Field(
-        description="The probe was wrong before the alarm already: only a measurement by hand shows that a part is good, and tool "
-        "changes bound nothing."
+        description="The probe was wrong before the alarm already: only a measurement by hand shows that a part is good, and the list "
+        "no longer stops at a tool change."
     ),
 ]
 _FOUND = (

@@ -153,8 +153,8 @@ def edit_note(superseded: list[int]) -> str | None:
 def will_fall(numbers: list[int]) -> str:
     """Open corrections that will be superseded when an offset is edited or a tool changed."""
     return ngettext(
-        "Correction {numbers} was computed for the offset until now and is dropped.",
-        "Corrections {numbers} were computed for the offset until now and are dropped.",
+        "Correction {numbers} was computed for the present offset and will be superseded.",
+        "Corrections {numbers} were computed for the present offset and will be superseded.",
         len(numbers),
     ).format(numbers=", ".join(map(str, numbers)))
 
@@ -162,8 +162,8 @@ def will_fall(numbers: list[int]) -> str:
 def will_fall_with_it(numbers: list[int]) -> str:
     """Open corrections that will be superseded when the empirical value is changed."""
     return ngettext(
-        "Correction {numbers} was computed with the empirical value until now and is dropped if that changes.",
-        "Corrections {numbers} were computed with the empirical value until now and are dropped if that changes.",
+        "Correction {numbers} was computed with the present empirical value and will be superseded if that changes.",
+        "Corrections {numbers} were computed with the present empirical value and will be superseded if that changes.",
         len(numbers),
     ).format(numbers=", ".join(map(str, numbers)))
 

@@ -369,7 +369,7 @@ def cautions(study: Study) -> list[str]:
     if study.far and study.furthest is not None:
         sentences.append(
             ngettext(
-                "Reading %(which)s lies far from all others (%(furthest)s µm), and decides these figures. Check it: if it is no size of the part, exclude it with a reason.",
+                "Reading %(which)s lies far from all others (%(furthest)s µm), and decides these figures. Check it: if it is not a size of the part, exclude it with a reason.",
                 "Readings %(which)s lie far from all others (up to %(furthest)s µm), and decide these figures. Check them: if they are no sizes of the parts, exclude them with a reason.",
                 len(study.far),
             )

@@ -183,7 +183,7 @@ def _in_table(wrong: Unreadable, first: int, column: int) -> Invalid:
 
 
 def rows_of(kind: str, grid: Grid) -> list[dict[str, Any]]:
-    """The filled grid as rows of the study. Raises `Invalid` that names each cell that is no number, or empty in between."""
+    """The filled grid as rows of the study. Raises `Invalid` that names each cell that is not a number, or empty in between."""
     wrong: list[FieldError] = []
     rows: list[dict[str, Any]] = []
     single: list[float] = []
@@ -228,7 +228,7 @@ def _values(
         if value is not None:
             values.append(value)
         elif cells[place].strip():
-            words = _("row {row}, column {column}: “{text}” is no number")
+            words = _("row {row}, column {column}: “{text}” is not a number")
             wrong.append(FieldError(field, words.format(row=line, column=where, text=cells[place].strip()[:30])))
         elif not gaps:
             wrong.append(FieldError(field, _("row {row}, column {column} is empty").format(row=line, column=where)))

@@ -39,7 +39,7 @@ _OPERATORS = {
 
 
 class Unreadable(ValueError):
-    """A cell that is no number; `row` and `column` count from 1."""
+    """A cell that is not a number; `row` and `column` count from 1."""
 
     def __init__(self, row: int, column: int, message: str) -> None:
         super().__init__(message)
@@ -91,7 +91,7 @@ def numbers(cells: Sequence[Sequence[str]]) -> list[list[float | None]]:
         for place, cell in enumerate(row, 1):
             value = number(cell) if cell.strip() else None
             if cell.strip() and value is None:
-                raise Unreadable(at, place, _("“{text}” is no number").format(text=cell[:30]))
+                raise Unreadable(at, place, _("“{text}” is not a number").format(text=cell[:30]))
             values.append(value)
         table.append(values)
     return table

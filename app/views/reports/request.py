@@ -119,7 +119,7 @@ def context_of(said: Mapping[str, str]) -> Chosen:
     """The context by the names of its fields, an empty one asks for nothing. Raises `Invalid`, naming every field."""
     chosen = tuple((field, value) for field in ContextField if (value := said.get(field.value, "").strip()))
     errors = [
-        FieldError(f"context.{field.value}", _("is no number of a nest: a whole number from 0 to 999999"))
+        FieldError(f"context.{field.value}", _("is not a number of a nest: a whole number from 0 to 999999"))
         for field, value in chosen
         if field is ContextField.NEST and not (value.isascii() and value.isdigit() and len(value) <= 6)
     ]

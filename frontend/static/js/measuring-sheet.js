@@ -4,7 +4,7 @@
 //   output[for]  beside a size: how far off the target it is while one types
 //   .number-keys digits to touch, shown where a finger points; the screen's own keyboard stays away from sizes then
 //
-// What is no number stays where it is: a scanned part does not become a size. Sent once: the button sleeps until the answer is there.
+// What is not a number stays where it is: a scanned part does not become a size. Sent once: the button sleeps until the answer is there.
 
 const MINUS = "\u2212";
 

@@ -97,7 +97,7 @@ def test_a_temperature_with_the_other_decimal_sign_is_left_out_and_said_once(tmp
     columns = {"characteristic": "feature", "measured": "actual", "part": "part", "part_temperature": "temp"}
     content = read(tmp_path, text, columns=columns, decimal=",")
     assert [each.body.get("context") for each in content.entries] == [None, None, {"part_temperature": 21.7}, None]
-    assert content.remarks == ["lines 2, 3, temp: '21.5' is no number of °C, with decimal = \",\"; left out"]
+    assert content.remarks == ["lines 2, 3, temp: '21.5' is not a number of °C, with decimal = \",\"; left out"]
 
 
 def test_values_of_aqdef_that_are_empty_are_not_called_marked(tmp_path: Path) -> None:
@@ -183,7 +183,7 @@ def test_aqdef_is_read_by_number_or_name_with_or_without_the_part(tmp_path: Path
     ("member", "words"),
     [
         ('"measured": 1' + 400 * "0", "line 1: holds 1000"),
-        ('"measured": 1e999', "line 1: holds 1e999, which is no number"),
+        ('"measured": 1e999', "line 1: holds 1e999, which is not a number"),
         ('"measured": 1, "part": "\\ud800"', "line 1: holds half a character"),
         ('"measured": ' + 100_000 * "[", "line 1: is no reading: its JSON is nested too deep"),
     ],
@@ -742,7 +742,7 @@ def test_a_temperature_that_is_left_out_is_logged_once_and_reported_until_a_good
     tmp_path: Path, caplog: pytest.LogCaptureFixture
 ) -> None:
     head = "feature;actual;part;temp\n"
-    words = "File a.csv, lines 2, 3, temp: '21.5' is no number of °C, with decimal = \",\"; left out."
+    words = "File a.csv, lines 2, 3, temp: '21.5' is not a number of °C, with decimal = \",\"; left out."
 
     async def work() -> None:
         store = store_in(tmp_path)

@@ -101,7 +101,7 @@ def test_a_temperature_that_is_left_out_is_reported_until_a_good_one_comes() -> 
     both = r"(?P<characteristic>\w+) (?P<measured>\S+) AT (?P<part_temperature>\S*) OF (?P<machine_temperature>\S*)"
     link = TextLink(machine(lines=[both]))
     part, of_machine = (
-        f"{name}_temperature '{value}' is no number of °C, with decimal = \".\"; left out."
+        f"{name}_temperature '{value}' is not a number of °C, with decimal = \".\"; left out."
         for name, value in (("part", "21,5"), ("machine", "---"))
     )
     link._source = Canned(

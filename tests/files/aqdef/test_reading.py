@@ -316,7 +316,7 @@ def test_what_is_not_understood_is_said_and_kept(tmp_path: Path) -> None:
         "line 5, K2001/1: 'D41' is written twice, in line 4 too; the last one counts",
         "line 6, K9876: 'x' is no field that is known here; it is kept and not used",
         "line 7, K12345: 'y' is no field that is known here; it is kept and not used",
-        "line 10: 'K2004/1-2 0' has an index that is no number ('1-2'); it is passed over",
+        "line 10: 'K2004/1-2 0' has an index that is not a number ('1-2'); it is passed over",
         "line 8: 'what' is neither a K field nor a value; it is passed over",
         "line 9, K0099: 'z' is no field that is known here; it is kept and not used",
         "line 12, K0008/1/: '4' has a second stroke, but no number of a value behind it; it is taken for K0008/1",

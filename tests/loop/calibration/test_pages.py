@@ -284,7 +284,7 @@ class TestInABrowser:
         expect(page.locator("#suggestion")).to_contain_text("+2.7")
         page.get_by_role("link", name="Accept +2.7").click()
         dialog = page.get_by_role("dialog")
-        dialog.get_by_role("radio", name="Compared with the measuring machine").check()
+        dialog.get_by_role("radio", name="Compared with the CMM").check()
         dialog.get_by_role("button", name="Accept").click()
         expect(page.locator("main")).to_contain_text("The empirical value is accepted")
         expect(page.locator("#now")).to_contain_text("+2.7")

@@ -67,7 +67,7 @@ class TestTyped:
     def test_what_is_wrong_is_named_and_what_was_typed_stays(self, shop: Shop, operator: Person) -> None:
         cells = {"c_0_0": "40,1", "c_0_1": "forty", "c_0_2": "40,2", "name_0": "Šipka “1”", "c_0_4": "40,3"}
         page = operator.send("/gauges/new", 422, **form(shop, "grr", **cells))
-        assert "“forty” is no number" in page
+        assert "“forty” is not a number" in page
         assert "column B 1 is empty" in page or "row Šipka “1”, column B 1 is empty" in page
         assert (cell(page, "c_0_1"), cell(page, "c_0_2"), cell(page, "name_0")) == ("forty", "40,2", "Šipka “1”")
         assert shop.call("GET", f"/gauge-studies?machine={shop.machine}")["items"] == []
@@ -157,7 +157,7 @@ class TestPasted:
     def test_what_cannot_be_read_is_named_and_stays(self, shop: Shop, operator: Person) -> None:
         wrong = table().replace("40,00064", "dirty")
         page = operator.send("/gauges/new", 422, **form(shop, "grr", do="paste", table=wrong))
-        assert "“dirty” is no number" in page
+        assert "“dirty” is not a number" in page
         assert "ow 2, column 4" in page
         assert "Deo 10" in page, "the table that was pasted is still there"
         for empty in ("", "   \n\t\n", "Part\tA\tB"):

@@ -20,7 +20,7 @@ def ranking(common_shop: Shop) -> Shop:
     for key, scale, shift in (("wide", 5.0, 0.0), ("narrow", 1.5, 0.0), ("broken", 0.0, 0.0), ("equal", 0.0, 1.0)):
         shop.add(f"{shop.machine}-{key}", tool_memory=0, average_memory=0)
         shop.push([scale * step[at % 8] + shift for at in range(24)], f"{shop.machine}-{key}")
-    shop.read(1500.0, f"{shop.machine}-narrow")  # a probe fault is no size of a part
+    shop.read(1500.0, f"{shop.machine}-narrow")  # a probe fault is not a size of a part
     narrow = f"{shop.machine}-narrow"
     alarm = shop.call("GET", f"/alarms?state=active&machine={shop.machine}")["items"][0]["id"]
     shop.call("POST", f"/alarms/{alarm}/acknowledge", action="false_reading", comment="dirt")

@@ -218,7 +218,7 @@ def test_an_empty_plant_leads_to_set_up_or_to_a_simulated_machine_that_leaves_no
         viewer.post("/simulated", 403)
 
         engineer.post("/simulated")
-        assert "is simulated: nothing of it was measured" in viewer.open("/")
+        assert "is simulated: none of its values were really measured" in viewer.open("/")
         client = empty.client(empty.key())
         [machine] = client.get("/api/v1/machines").json()["items"]
         assert machine["simulated"]

@@ -166,7 +166,7 @@ class TestByTouch:
             page.keyboard.press("Enter")
         last = page.locator(f'[id="size:{other}"]')
         expect(last).to_be_focused()
-        page.keyboard.type("SN-813")  # a scan that came too late is no size
+        page.keyboard.type("SN-813")  # a scan that came too late is not a size
         page.keyboard.press("Enter")
         expect(last).to_have_attribute("aria-invalid", "true")
         last.fill("")

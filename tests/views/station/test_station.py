@@ -87,7 +87,7 @@ class TestWithoutScripts:
         second = shop.read(-6.0, key, correction_in_effect=0)["correction"]["number"]
         operator.send(f"{here}/corrections/{second}", do="rejected", reason="False reading")
         assert shop.correction(second)["status"] == "rejected"
-        assert "had been decided meanwhile" in operator.send(
+        assert "someone else had already decided" in operator.send(
             f"{here}/corrections/{second}", do="approve", reason="As expected"
         )
 

@@ -105,7 +105,7 @@ def test_a_correction_is_decided_from_its_row(waits: Shop, operator: Person, vie
     assert f"Correction {number} is approved" in operator.send(here, **fields)
     fields["do"] = "rejected"
     waits.correction(number, "applied")
-    assert "had been decided meanwhile" in operator.send(here, **fields)
+    assert "someone else had already decided" in operator.send(here, **fields)
 
 
 def test_the_count_in_the_bar_follows_proposals(page: Page, waits: Shop, engineer: Person) -> None:

@@ -218,7 +218,7 @@ def _sizes(line: SheetLine, form: Mapping[str, str], errors: list[FieldError]) -
 
 
 def fault_words(fault: NumberFault) -> str:
-    """The reason why what was typed is no size."""
+    """The reason why what was typed is not a size."""
     if fault is NumberFault.THOUSANDS:
         return _("write it without a separator of thousands")
     if fault is NumberFault.BRACKETS:
