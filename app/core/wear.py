@@ -13,7 +13,7 @@ with S = 0, so with its setting error. Whatever was decided and however late it 
 (`fit`). Its standard error counts positively autocorrelated scatter by the effective number of readings
 n (1 - rho) / (1 + rho), rho the lag-1 autocorrelation of the residuals (Santer et al. 2000, J. Geophys. Res. 105, 7337,
 eq. 6; rho freed of its bias of -(2 + 4 rho)/n after Marriott and Pope 1954, Biometrika 41, 390). It assumes that
-scatter is of one size; an edge that breaks cannot be foretold. Readings are rounded, so the standard deviation about the line
+scatter is of one size; an edge that breaks cannot be predicted. Readings are rounded, so the standard deviation about the line
 is at least that of rounding alone, step / sqrt(12) (GUM, JCGM 100:2008, F.2.2.1), with the smallest distance between two
 different readings as the step (`resolution_of`): readings exactly on a line know its slope no better than that. `app.core.forecast` continues the line. Lengths are mm.
 """

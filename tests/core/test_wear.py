@@ -156,7 +156,7 @@ def test_run_in_and_chips_end_the_past() -> None:
     assert abs(found.slope - 0.00005) < 4 * found.slope_error
 
 
-def test_an_edge_that_breaks_bends_no_line_and_foretells_nothing() -> None:
+def test_an_edge_that_breaks_bends_no_line_and_predicts_nothing() -> None:
     curve = line(100, 0.0001, 0.0005, seed=1)
     curve[-3:] += 0.4
     found = fitted(curve)

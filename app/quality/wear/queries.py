@@ -1,4 +1,4 @@
-"""The wear curve of a characteristic, what it foretells, and whether its loop hunts. Never writes.
+"""The wear curve of a characteristic, what it predicts, and whether its loop hunts. Never writes.
 
 The newest readings are read one by one. Of a longer run, what is older is read as evenly spread groups of neighbouring
 readings, each drawn as its mean: wear is slow, and a curve of a million readings costs what one of two thousand does.

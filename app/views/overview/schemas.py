@@ -62,7 +62,7 @@ class RankedOut(BaseModel):
     weeks: list[WeekOut] = Field(
         description="The index of each of the last 13 weeks that has readings, the oldest first, as the periodic job worked it out."
     )
-    parts_left: float | None = Field(description="Parts until wear comes to the first limit, as foretold.")
+    parts_left: float | None = Field(description="Parts until wear comes to the first limit, as predicted.")
     signals: list[int] = Field(description="Numbers of the open signals.")
     alarms: int = Field(description="Active alarms.")
     alarms_per_shift: float = Field(description="Alarms that parts gave per 8 hours, over the last 7 days.")

@@ -91,7 +91,7 @@ class ShiftWearingOut(BaseModel):
 
     characteristic: str
     machine: str
-    parts_left: Annotated[float, Field(description="Parts until wear comes to the first limit, as foretold.")]
+    parts_left: Annotated[float, Field(description="Parts until wear comes to the first limit, as predicted.")]
 
 
 class ShiftBelowOut(BaseModel):

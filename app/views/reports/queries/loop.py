@@ -102,7 +102,7 @@ def tools(frame: Frame) -> Section | None:
 
 
 def wear(frame: Frame) -> Section | None:
-    """Wear per part, what it foretells, and whether the loop hunts; nothing where there are no readings."""
+    """Wear per part, what it predicts, and whether the loop hunts; nothing where there are no readings."""
     if not frame.window.count:
         return None
     study = wears.wear_of(frame.session, frame.current, frame.window)
