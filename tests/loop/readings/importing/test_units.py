@@ -16,7 +16,7 @@ from app.loop.readings.importing.layout import Wishes, look
 from app.loop.readings.importing.lines import Line, lines
 from app.quality.gauge_studies.form_reader import pasted_grid
 from tests.bridge.kinds.test_text import printed
-from tests.loop.readings.importing.test_doors import bridged
+from tests.loop.readings.importing.doors import bridged
 
 Answer = list[float] | str
 """Sizes, mm, or words of the refusal."""
