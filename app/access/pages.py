@@ -50,7 +50,7 @@ def sign_in_page(request: Request, session: SessionDep, after: Next = "/", ended
         "access/sign_in.html",
         after=local_path(after),
         name="",
-        problem=actions.SessionEnded() if ended == "password" else None,
+        ended=actions.SessionEnded() if ended == "password" else None,
         anybody=queries.anybody(session),
     )
 
@@ -74,11 +74,10 @@ def send_sign_in(request: Request, form: FormDep, settings: SettingsDep) -> Resp
         return page(
             request,
             "access/sign_in.html",
-            status=error.status,
-            headers=error.headers,
+            refusal=error,
             after=after,
             name=name,
-            problem=error,
+            ended=None,
             anybody=True,
         )
     log.info("%s signed in from %s", name.strip(), address)
@@ -118,8 +117,6 @@ def invitation_page(request: Request, session: SessionDep, token: str) -> Respon
         status=200 if invitation else 404,
         role=invitation.role if invitation else None,
         name="",
-        errors={},
-        problem=None,
         shortest=SHORTEST,
     )
 
@@ -130,29 +127,22 @@ def send_invitation(
     request: Request, session: SessionDep, form: FormDep, settings: SettingsDep, token: str
 ) -> Response:
     invitation = queries.open_invitation(session, token)
-    errors: dict[str, str] = {}
-    problem = None
-    if form.get("password", "") != form.get("again", ""):
-        errors = {"again": _("Is not the same as the password above")}
-    else:
-        try:
-            with session.begin_nested():  # a refused name must leave the invitation unused
-                person = actions.accept_invitation(session, token, form.get("name", ""), form.get("password", ""))
-        except InbandError as error:
-            errors, problem = by_field(error), error
-        else:
-            signed_in = begin_session(session, person.id, settings.session_hours)
-            return _with_session(RedirectResponse("/", 303), signed_in, settings)
-    return page(
-        request,
-        "access/invitation.html",
-        status=problem.status if problem else 422,
-        role=invitation.role if invitation else None,
-        name=form.get("name", ""),
-        errors=errors,
-        problem=problem,
-        shortest=SHORTEST,
-    )
+    try:
+        if form.get("password", "") != form.get("again", ""):
+            raise Invalid.at("again", _("Is not the same as the password above"))
+        with session.begin_nested():  # a refused name must leave the invitation unused
+            person = actions.accept_invitation(session, token, form.get("name", ""), form.get("password", ""))
+    except InbandError as error:
+        return page(
+            request,
+            "access/invitation.html",
+            refusal=error,
+            role=invitation.role if invitation else None,
+            name=form.get("name", ""),
+            shortest=SHORTEST,
+        )
+    signed_in = begin_session(session, person.id, settings.session_hours)
+    return _with_session(RedirectResponse("/", 303), signed_in, settings)
 
 
 @router.get("/account")

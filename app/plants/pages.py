@@ -72,7 +72,7 @@ async def send_sign_in(request: Request, form: FormDep, settings: SettingsDep) -
         )
     if signed_in or refusal is None:
         return answer
-    return await _page(request, name=name, problem=refusal)
+    return await _page(request, name=name, refusal=refusal)
 
 
 @router.get("/{path:path}")
@@ -104,21 +104,19 @@ def _sign_in(served: Served, name: str, password: str, address: str) -> SignedIn
     return sign_in(_database(served), name, password, address, served.settings.session_hours)
 
 
-async def _page(request: Request, name: str = "", problem: InbandError | None = None) -> Response:
+async def _page(request: Request, name: str = "", refusal: InbandError | None = None) -> Response:
     plants: Plants = request.app.state.plants
     tokens = cookies_of(request.headers.get("cookie", ""), SESSION_COOKIE, [each.plant.key for each in plants.served])
     rows = await asyncio.gather(*(run_in_threadpool(_row, each, tokens.get(each.plant.key)) for each in plants.served))
     return page(
         request,
         "plants/plants.html",
-        status=problem.status if problem else 200,
-        headers=problem.headers if problem else None,
+        refusal=refusal,
         rows=rows,
         not_served=[plant.name for plant in plants.not_served],
         signed_in=any(row.person for row in rows),
         everywhere=all(row.person for row in rows),
         name=name,
-        problem=problem,
     )
 
 

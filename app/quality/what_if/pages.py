@@ -64,20 +64,23 @@ def _what_if(
     typed: dict[str, str],
     *,
     reason: str = "",
-    refused: InbandError | None = None,
+    refusal: InbandError | None = None,
 ) -> Response:
     answer: Simulation | None = None
     fewer: Sampling | None = None
     map_result: Map | Invalid | None = None
-    status, problem, errors = 200, refused, form_reader.at_fields(by_field(refused)) if refused else {}
+    nothing: Invalid | None = None
     try:
         request_body = form_reader.request_of(typed)
         asked = SampledIn(**request_body.model_dump(by_alias=True), every=FEWER)
         answer, fewer, map_result = simulation.everything(session, current, asked, form_reader.map_request(typed))
-    except (Invalid, TooManyRequests) as error:
-        # That a period holds nothing to replay is no mistake of who looks at it.
-        status = error.status if error.errors or isinstance(error, TooManyRequests) else 200
-        problem, errors = error, form_reader.at_fields(by_field(error))
+    except TooManyRequests as error:
+        refusal = refusal or error
+    except Invalid as error:
+        if error.errors:
+            refusal = refusal or error
+        else:
+            nothing = error  # that a period holds nothing to replay is no mistake of who looks at it
     changes = wording.changed(asdict(answer.past.current.parameters), actions.changes_of(answer)) if answer else []
     key, failing = current.characteristic.key, proof.failing()
     offered = summaries.offered(session, current.characteristic)
@@ -85,7 +88,7 @@ def _what_if(
     return page(
         request,
         "what_if/what_if.html",
-        status=refused.status if refused else status,
+        refusal=refusal,
         characteristic=current.characteristic,
         machine=current.machine,
         today=current.parameters,
@@ -93,8 +96,8 @@ def _what_if(
         tool_since=summaries.tool_since(session, current.characteristic),
         periods=form_reader.counts(typed["last"]),
         placeholders=form_reader.placeholders(current.parameters, answer.past.delay if answer else None),
-        errors=errors,
-        problem=problem,
+        errors=form_reader.at_fields(by_field(refusal)) if refusal else {},
+        nothing=nothing,
         answer=answer,
         changes=changes,
         bys=[(by.value, field_word(by)) for by in ContextField if by in offered or by == typed["by"]],
@@ -160,7 +163,7 @@ def send_proposal(
     except (Invalid, Conflict, TooManyRequests) as error:
         session.expire_all()
         current = characteristics.characteristic_named(session, characteristic)
-        return _what_if(request, session, caller, current, typed, reason=form.get("reason", ""), refused=error)
+        return _what_if(request, session, caller, current, typed, reason=form.get("reason", ""), refusal=error)
     return RedirectResponse(f"/proposals/{row.proposal.id}?done=proposed", 303)
 
 

@@ -68,7 +68,7 @@ def _send(request: Request, session: Session, caller: Caller, form: FormData) ->
         with session.begin_nested():
             actions.ask(session, Bundle(report_request, form_of, keys, (), current_language()), caller)  # type: ignore[arg-type]
     except InbandError as error:
-        return _page(request, session, caller, chosen=keys, given=fields, problem=error)
+        return _page(request, session, caller, chosen=keys, given=fields, refusal=error)
     report_worker(request).wake()
     return RedirectResponse("/reports#jobs", 303)
 
@@ -82,7 +82,7 @@ def send_cancellation(request: Request, session: SessionDep, caller: Viewer, num
     except InbandError as error:
         if error.status == 404:
             raise
-        return _page(request, session, caller, problem=error)
+        return _page(request, session, caller, refusal=error)
     return RedirectResponse("/reports#jobs", 303)
 
 
@@ -95,7 +95,7 @@ def send_to_the_bin(request: Request, session: SessionDep, caller: Viewer, numbe
     except InbandError as error:
         if error.status == 404:
             raise
-        return _page(request, session, caller, problem=error)
+        return _page(request, session, caller, refusal=error)
     return RedirectResponse("/reports#jobs", 303)
 
 
@@ -109,7 +109,7 @@ def _page(
     *,
     chosen: Sequence[str] = (),
     given: dict[str, str] | None = None,
-    problem: InbandError | None = None,
+    refusal: InbandError | None = None,
     before: int | None = None,
     part: str | None = None,
 ) -> Response:
@@ -119,7 +119,7 @@ def _page(
     return page(
         request,
         "reports/jobs.html",
-        refusal=problem,
+        refusal=refusal,
         jobs=jobs,
         troubles={job.id: queries.troubles(session, job.id) for job in jobs.rows if job.problems},
         may_cancel=lambda job: queries.may_end(job, caller),

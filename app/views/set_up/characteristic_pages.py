@@ -200,10 +200,8 @@ def send_characteristic(
             session,
             caller,
             queries.characteristic_named(session, characteristic),
-            status=error.status,
+            refusal=error,
             typed=form,
-            errors=by_field(error),
-            problem=error if error.status == Conflict.status else None,
         )
     after = (current.version.version, current.characteristic.name, current.characteristic.part)
     done = "same" if before == after else "changed"
@@ -233,9 +231,7 @@ def send_form(request: Request, session: SessionDep, caller: Engineer, character
         session.expire_all()
         errors = by_field(error)
         wrong = {"result": errors.get("form_of.result"), "limit": errors.get("upper_deviation")} | errors
-        return _characteristic(
-            request, session, caller, current, status=error.status, form_typed=form, form_errors=wrong
-        )
+        return _characteristic(request, session, caller, current, refusal=error, form_typed=form, form_errors=wrong)
     return RedirectResponse(f"/setup/characteristics/{stored.characteristic.key}?done=added", 303)
 
 
@@ -274,10 +270,8 @@ def _characteristic(
     caller: Caller,
     current: queries.CurrentCharacteristic,
     *,
-    status: int = 200,
     typed: Mapping[str, str] | None = None,
-    errors: Mapping[str, str] | None = None,
-    problem: InbandError | None = None,
+    refusal: InbandError | None = None,
     form_typed: Mapping[str, str] | None = None,
     form_errors: Mapping[str, str | None] | None = None,
 ) -> Response:
@@ -293,14 +287,13 @@ def _characteristic(
         "characteristic.html",
         caller,
         "characteristics",
-        status=status,
+        refusal=refusal,
         characteristic=characteristic,
         machine=current.machine,
         read=readings.count_of(session, characteristic),
         version=current.version,
         changed={name for name, text in in_force.items() if typed.get(name, "") != text},
         measures_only=None if current.source else _why_it_measures_only(current.parameters),
-        problem=problem,
         warnings=actions.warnings_of(
             current,
             queries.target_before(session, current),
@@ -325,7 +318,7 @@ def _characteristic(
         result_label=result_label,
         form_typed={"key": "", "name": "", "result": "", "limit": ""} | dict(form_typed or {}),
         form_errors=form_errors or {},
-        **_form(typed, errors or {}),
+        **_form(typed, by_field(refusal) if refusal and not form_errors else {}),
     )
 
 

@@ -60,7 +60,7 @@ def _change(request: Request, session: Session, caller: Caller, form: Mapping[st
     except InbandError as error:
         session.expire_all()
         chosen = {key for key, _colon, _version in (pair.partition(":") for pair in form.get("versions", "").split())}
-        return _page(request, session, caller, form, chosen, asked=True, problem=error)
+        return _page(request, session, caller, form, chosen, asked=True, refusal=error)
     shown = address("/setup/parameters", machine=form.get("machine"), parameter=form.get("parameter"), changed=number)
     return RedirectResponse(shown, 303)
 
@@ -96,7 +96,7 @@ def _page(
     chosen: set[str],
     *,
     asked: bool,
-    problem: InbandError | None = None,
+    refusal: InbandError | None = None,
 ) -> Response:
     machine = machines.find_machine(session, said.get("machine", ""))
     field = BY_NAME.get(said.get("parameter", ""))
@@ -113,7 +113,7 @@ def _page(
         "many.html",
         caller,
         "characteristics",
-        status=problem.status if problem else 200,
+        refusal=refusal,
         machines=[("", _("All machines")), *((each.key, each.name) for each in machines.machines(session, limit=MOST))],
         fields=[
             (each.name, f"{each.r} {label(each.name)}" if each.r else label(each.name))
@@ -131,7 +131,6 @@ def _page(
         plan=plan,
         versions=" ".join(f"{each.current.characteristic.key}:{each.current.version.version}" for each in plan),
         may_change=bool(plan) and not any(each.errors for each in plan) and not all(each.is_same for each in plan),
-        problem=problem,
         changed=request.query_params.get("changed"),
         most=MOST if len(rows) == MOST else None,
     )

@@ -74,14 +74,13 @@ def _start(
     session: Any,
     characteristic: str,
     *,
-    error: str | None = None,
+    refusal: InbandError | None = None,
     done: dict[str, Any] | None = None,
-    status: int = 200,
 ) -> Response:
     return page(
         request,
         "imports/start.html",
-        status=status,
+        refusal=refusal,
         choices=[
             ("", _("Several: a column for each")),
             *(
@@ -90,7 +89,6 @@ def _start(
             ),
         ],
         chosen=characteristic,
-        error=error,
         done=done,
     )
 
@@ -107,22 +105,21 @@ async def send(request: Request, session: SessionDep, caller: Engineer, settings
             if isinstance(each, UploadFile) and each.filename
         ]
         if not files:
-            return await run_in_threadpool(
-                _start, request, session, characteristic, error=_("Choose the file to import."), status=422
-            )
+            refusal = Invalid.at("file", _("Choose the file to import."))
+            return await run_in_threadpool(_start, request, session, characteristic, refusal=refusal)
         if characteristic:
             await run_in_threadpool(characteristics.characteristic_named, session, characteristic)
         await run_in_threadpool(session.commit)  # nothing is kept open while a workbook is read
         try:
             kept = await run_in_threadpool(uploads.keep_pair, settings, caller.name, files)
         except Invalid as error:
-            return await run_in_threadpool(_refused, request, characteristic, error.detail)
+            return await run_in_threadpool(_refused, request, characteristic, error)
         return RedirectResponse(address(f"/import/{kept.token}", characteristic=characteristic or None), 303)
 
 
-def _refused(request: Request, characteristic: str, error: str) -> Response:
+def _refused(request: Request, characteristic: str, refusal: Invalid) -> Response:
     with _database(request).sessions() as session:
-        return _start(request, session, characteristic, error=error, status=422)
+        return _start(request, session, characteristic, refusal=refusal)
 
 
 @router.get("/import/{token}")
