@@ -233,7 +233,7 @@ def _secret(table: dict[str, Any], place: str, folder: Path, problems: list[str]
     if len(given) != 1 or not all(isinstance(value, str) for value in given.values()):
         problems.append(
             f"{place} needs one of secret, secret_file and secret_env: the key of the machine that Inband showed once"
-            " (Set-up, Machines, Keys)."
+            " (Set-up, Machines, the machine, Make key)."
         )
         return None
     [(name, value)] = given.items()
