@@ -119,11 +119,11 @@ def opposed(
     judged = Judged(*judge(deviation, compensated, factor, begin, expected, averaging_limit))
     if not judged.opposed:
         return None
-    first, second = _steps(deviation, compensated, factor, (begin, judged.first, judged.second))
+    first, second = steps_of(deviation, compensated, factor, (begin, judged.first, judged.second))
     return Opposed(first, second, judged.gain, judged.error)
 
 
-def _steps(deviation: Floats, compensated: Floats, factor: float, places: tuple[int, int, int]) -> tuple[Step, Step]:
+def steps_of(deviation: Floats, compensated: Floats, factor: float, places: tuple[int, int, int]) -> tuple[Step, Step]:
     """Return what the two newest corrections asked and did. places: the beginning, and where each took effect."""
     start, first, second = places
     end = len(deviation)
@@ -155,7 +155,7 @@ def overdone(deviation: Floats, compensated: Floats, factor: float, expected: fl
     start, first, second = newest_two(compensated, 0, NM, np.inf)
     if first == 0:
         return None
-    steps = _steps(deviation, compensated, factor, (start, first, second))
+    steps = steps_of(deviation, compensated, factor, (start, first, second))
     if steps[1].asked / steps[0].asked > BACK:
         return None
     low, high = sorted(step.done / step.asked for step in steps)
@@ -230,21 +230,31 @@ def line_through(deviation: Floats, compensated: Floats, factor: float, low: int
     return xd / xx if xx > 0 else 0.0
 
 
+def grid_of(deviation: Floats) -> float:
+    """Return the smallest difference between two parts: what the readings are rounded to, or less. 0: they are all alike.
+
+    Between any two: where the size swings from side to side, those in a row are far apart.
+    """
+    ordered, smallest = np.sort(deviation), np.inf
+    for i in range(1, len(ordered)):
+        if NM < ordered[i] - ordered[i - 1] < smallest:
+            smallest = ordered[i] - ordered[i - 1]
+    return smallest if smallest < np.inf else 0.0
+
+
 def scatter_of(deviation: Floats, compensated: Floats, factor: float, expected: float, first: int) -> float:
     """Return the standard deviation of the scatter: the steps from part to part, of which large ones count as `FAR` (Huber).
 
     What corrections did is taken out by a line through those before `first` and one through the others, whatever their gains;
     `expected` is worth `PRIOR` parts more. It is never below half a step of what the readings are rounded to.
     """
-    count, smallest = len(deviation), np.inf
+    count = len(deviation)
     before = line_through(deviation, compensated, factor, 0, first)
     since = line_through(deviation, compensated, factor, first - 1, count)
     steps = np.empty(count - 1)
     for i in range(1, count):
         asked = (compensated[i - 1] - compensated[i]) / factor
         step = deviation[i] - deviation[i - 1]
-        if NM < abs(step) < smallest:
-            smallest = abs(step)
         steps[i - 1] = abs(step - (before if i < first else since) * asked)
     freedom = max(count - 3.0, 0.0)
     scatter = float(np.median(steps)) * 1.4826 / sqrt(2.0)
@@ -254,8 +264,8 @@ def scatter_of(deviation: Floats, compensated: Floats, factor: float, expected: 
             for step in steps:
                 squares += min(step, far) ** 2 / 2
             scatter = sqrt(squares / freedom / LEFT)
-    if count >= KNOWN and smallest < np.inf:
-        scatter = max(scatter, smallest / 2)
+    if count >= KNOWN:
+        scatter = max(scatter, grid_of(deviation) / 2)
     return sqrt((PRIOR * expected * expected + freedom * scatter * scatter) / (PRIOR + freedom))
 
 

@@ -109,7 +109,10 @@ MISTAKES = {
         gains,
     ),
     "radius for diameter": Mistake(
-        RADIUS, {"unusual_gain": "act too strongly: gain +"}, partial(amiss, 2.0, START), gains
+        RADIUS,
+        {"unusual_gain": "act too strongly: gain +", "strong_effect": "act too strongly: the gain is +"},
+        partial(amiss, 2.0, START),
+        gains,
     ),
     "no effect": Mistake(NOTHING, {"unusual_gain": "change nothing: gain"}, partial(amiss, 0.0, START), gains),
     "no location": Mistake(

@@ -158,6 +158,16 @@ def test_a_machine_that_obeys_cuts_no_series_with_a_wrong_sign(server: Server, t
     assert all("asks the machine to stop" in each["text"] for each in said)
 
 
+def test_a_machine_that_obeys_cuts_few_parts_with_a_radius_for_a_diameter(server: Server, tmp_path: Path) -> None:
+    """The first part is 10 µm off, the next ones as far on the other side in turn: the tool is paused, and the part asks for stop."""
+    one, found = mistaken(server, "rest", 30, tmp_path, eventful=False, amiss=2.0, start=0.010, obeys=True)
+    assert one.process.parts <= 9
+    assert max(Counter(number for number, _ in found.out).values()) <= 9
+    said = one.call("GET", f"/alarms?state=active&kind=strong_effect&machine={one.machine}")["items"]
+    assert said
+    assert all("radius taken for diameter?" in each["text"] for each in said)
+
+
 @pytest.mark.long
 @pytest.mark.parametrize("kind", sorted(KINDS))
 def test_a_wrong_sign_goes_no_further_behind_a_bridge(server: Server, tmp_path: Path, kind: str) -> None:

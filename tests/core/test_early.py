@@ -11,7 +11,7 @@ from app.core.decision.step import BELIEVED, CORRECT, effect_of, rounded, step
 from app.core.early import acts_early
 from app.core.gain import LONGEST, expected_scatter
 from tests.chance import runs
-from tests.core.test_gain import SETTINGS, rules_of
+from tests.core.tool_lives import SETTINGS, rules_of
 
 ROOM = 256  # corrections that may be on the way
 

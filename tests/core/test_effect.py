@@ -22,7 +22,7 @@ from app.core.replay import Policy, ReplayedCharacteristic, run, without_events
 from app.core.spc.refusal import Reason, Refused
 from tests.chance import runs
 from tests.core.conftest import SEAT
-from tests.core.test_gain import rules_of
+from tests.core.tool_lives import rules_of
 
 Values = NDArray[np.float64]
 LIFE = 520

@@ -11,11 +11,13 @@ from app.db.base import Base
 OUTSTANDING = ("awaiting_approval", "pending")  # issued, not yet in effect
 OPEN = ("held", *OUTSTANDING)
 OPPOSITE = "opposite_effect"  # the alarm of corrections that did the opposite of what they asked
+STRONG = "strong_effect"  # that of corrections that act too strongly and drive parts out of tolerance
 EARLY = "early_effect"  # that of corrections that act before they are counted
 DOUBT = "correction_in_doubt"  # that of a reading whose correction_in_effect does not fit
 OPPOSED = "opposite effect, alarm:"  # why corrections fell, as it is stored; the number of the alarm goes with it
+OVERSHOT = "strong effect, alarm:"
 COUNTED_LATE = "early effect, alarm:"
-FELL = {OPPOSITE: OPPOSED, EARLY: COUNTED_LATE}
+FELL = {OPPOSITE: OPPOSED, STRONG: OVERSHOT, EARLY: COUNTED_LATE}
 
 
 class Tool(Base):

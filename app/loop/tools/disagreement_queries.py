@@ -10,7 +10,7 @@ from app.loop.tables.alarms import Alarm
 from app.loop.tables.characteristics import Characteristic
 from app.loop.tables.readings import Stream
 from app.loop.tables.tools import OUTSTANDING, Correction, Tool
-from app.loop.tools.alarm_kinds import CHARACTERISTICS_DISAGREE
+from app.loop.tools.effect_alarm_kinds import CHARACTERISTICS_DISAGREE
 
 
 def disagreement_on(session: Session, machine_id: int, number: int) -> dict[str, Any] | None:

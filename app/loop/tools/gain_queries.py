@@ -13,10 +13,14 @@ from app.loop.tables.alarms import Alarm
 from app.loop.tables.characteristics import Characteristic, ParametersVersion
 from app.loop.tables.machines import Machine
 from app.loop.tables.readings import Exclusion, Reading, Stream
-from app.loop.tables.tools import OPPOSITE, Tool
-from app.loop.tools.alarm_kinds import UNUSUAL_GAIN
+from app.loop.tables.tools import OPPOSITE, STRONG, Tool
+from app.loop.tools.effect_alarm_kinds import UNUSUAL_GAIN
 
 NEWEST = 200  # readings that are looked at
+VERDICTS = {
+    OPPOSITE: GainVerdict.OPPOSITE,
+    STRONG: GainVerdict.STRONG,
+}  # by the alarm that pauses the tool for its gain
 NOT_OF_GAIN = ("implausible", "imported")  # codes of readings that say nothing of it
 
 
@@ -54,19 +58,23 @@ def gains(session: Session, machine: Machine, number: int) -> list[ToolGain]:
 
 
 def shown_gains(session: Session, machine: Machine, number: int) -> list[ToolGain]:
-    """The same for people. While the tool is paused for what two corrections did, that is the gain known last."""
-    found = gains(session, machine, number)
-    pausing = session.scalars(
-        select(Alarm)
-        .join(Tool, (Tool.machine_id == Alarm.machine_id) & (Tool.paused_by == Alarm.id))
-        .where(Tool.machine_id == machine.id, Tool.number == number, Alarm.kind == OPPOSITE)
-    ).one_or_none()
+    """The same for people. While the tool is paused for what corrections did, that is the gain known last."""
+    found, pausing = gains(session, machine, number), paused_for(session, machine.id, number)
     if pausing is None:
         return found
     gain, half = pausing.data["gain"], 2 * pausing.data["error"]
-    known = Gain(gain, gain - half, gain + half, len(pausing.data["corrections"]), 0, GainVerdict.OPPOSITE)
+    known = Gain(gain, gain - half, gain + half, len(pausing.data["corrections"]), 0, VERDICTS[pausing.kind])
     of = pausing.data["characteristic"]
     return [each._replace(gain=each.gain or known) if each.characteristic == of else each for each in found]
+
+
+def paused_for(session: Session, machine_id: int, number: int) -> Alarm | None:
+    """The alarm that has paused the tool for its gain, if one has."""
+    return session.scalars(
+        select(Alarm)
+        .join(Tool, (Tool.machine_id == Alarm.machine_id) & (Tool.paused_by == Alarm.id))
+        .where(Tool.machine_id == machine_id, Tool.number == number, Alarm.kind.in_(VERDICTS))
+    ).one_or_none()
 
 
 def _gain(session: Session, stream: Stream, parameters: Parameters) -> Gain | None:

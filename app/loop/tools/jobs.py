@@ -17,7 +17,8 @@ from app.loop.tables.machines import Machine
 from app.loop.tables.readings import Stream
 from app.loop.tables.tools import OUTSTANDING, Correction, Tool
 from app.loop.tools import disagreement_queries, gain_queries, wording
-from app.loop.tools.alarm_kinds import CHARACTERISTICS_DISAGREE, TOOL_LIFE, UNUSUAL_GAIN
+from app.loop.tools.alarm_kinds import TOOL_LIFE
+from app.loop.tools.effect_alarm_kinds import CHARACTERISTICS_DISAGREE, UNUSUAL_GAIN
 from app.loop.tools.events import alarm_raised
 from app.loop.tools.lives_queries import plan_of
 
@@ -160,13 +161,15 @@ def corrected_tools(session: Session) -> list[Unit]:
 
 
 def tell_gain(session: Session, unit: Unit) -> None:
-    """A gain that is credibly nearer to a half or to 2 than to 1 raises *unusual gain*, once until it is answered."""
+    """A gain that is credibly nearer to a half or to 2 than to 1 raises *unusual gain*, once until it is answered; not while it pauses the tool."""
     machine_id, number = (int(part) for part in unit.key)
     machine = session.get_one(Machine, machine_id)
     credible = [each for each in gain_queries.gains(session, machine, number) if each.gain and each.gain.verdict]
     if not credible:
         return
     lock_machines(session, [machine_id])
+    if gain_queries.paused_for(session, machine_id, number) is not None:
+        return
     for characteristic_id, key, factor, gain in credible:
         if gain is None or gain.verdict is None or alarms.active(session, machine_id, characteristic_id, UNUSUAL_GAIN):
             continue

@@ -5,7 +5,7 @@ from datetime import UTC, datetime
 from app.language.i18n import _, ngettext
 from app.language.numbers import NOTHING, PLUS_MINUS, age, fixed, mm, um
 from app.language.times import in_sentence
-from app.loop.tables.tools import COUNTED_LATE, OPPOSED, Correction
+from app.loop.tables.tools import COUNTED_LATE, OPPOSED, OVERSHOT, Correction
 from app.loop.tools.gain_queries import ToolGain
 from app.loop.tools.lives_queries import Life
 from app.loop.tools.queries import OffsetChange
@@ -29,6 +29,9 @@ def why(correction: Correction) -> str | None:
     if reason.startswith(OPPOSED):
         alarm = reason.removeprefix(OPPOSED).strip()
         return _("corrections before it did the opposite of what they asked (alarm {alarm})").format(alarm=alarm)
+    if reason.startswith(OVERSHOT):
+        alarm = reason.removeprefix(OVERSHOT).strip()
+        return _("corrections before it acted too strongly (alarm {alarm})").format(alarm=alarm)
     if reason.startswith(COUNTED_LATE):
         alarm = reason.removeprefix(COUNTED_LATE).strip()
         return _("corrections before it acted earlier than they were counted (alarm {alarm})").format(alarm=alarm)

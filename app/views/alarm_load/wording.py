@@ -26,6 +26,7 @@ def made_by(kind: str) -> str:
         "offset_limit": _("largest sum of corrections"),
         "offset_differs": _("offset that the control reports"),
         "opposite_effect": _("factor, or the offset register"),
+        "strong_effect": _("factor, or the offset register"),
         "early_effect": _("the machine's clock, or what it says is in effect"),
         "correction_in_doubt": _("what the machine says is in effect"),
         "unusual_gain": _("factor"),

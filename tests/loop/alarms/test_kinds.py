@@ -64,6 +64,7 @@ DATA: dict[str, list[dict[str, Any]]] = {
     "offset_limit": [_SIZE],
     "implausible": [_SIZE],
     "opposite_effect": [_GAIN | {"corrections": [_STEP, _STEP]}],
+    "strong_effect": [_GAIN | {"corrections": [_STEP, _STEP], "parts": 9, "out": 8}],
     "early_effect": [
         {"characteristic": "seat", "share": 0.98, "error": 0.09, "after": 1, "lag": 7200.0, "by": by}
         for by in ("machined_at", "correction_in_effect", "confirmation")

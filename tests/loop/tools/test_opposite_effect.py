@@ -154,6 +154,36 @@ def test_an_unusual_gain_is_reported_with_its_number(
     assert f"from {told['corrections']} corrections" in page
 
 
+def test_a_radius_for_a_diameter_pauses_the_tool_once_parts_are_out(shop: Shop, server: Any) -> None:
+    """A pause as that of a wrong sign, answered and resumed as that is; the warning is not raised beside it."""
+    loop, chance = Loop(shop, 2.0), np.random.default_rng(6)
+    loop.size = 10.0
+    changed = {"factor": -1, "tolerance_width": 0.016}
+    shop.call("PATCH", f"/characteristics/{loop.key}", parameters=changed, reason="as it is usual")
+    answers: list[Any] = []
+    while not answers or answers[-1]["reason"]["code"] != "paused":
+        answers.append(loop.part(round(float(chance.normal(0, 0.3)), 2)))
+        assert len(answers) < 10
+    assert answers[-1]["action"] == "stop", "the part is out"
+    (alarm,) = [each for each in shop.alarms() if each["kind"] == "strong_effect"]
+    assert (alarm["tool_memory"], alarm["characteristic"]) == (4, None)
+    assert alarm["data"]["gain"] == pytest.approx(2, abs=0.15)
+    assert f"the gain is +{alarm['data']['gain']:.2f} ± {alarm['data']['error']:.2f}, it should be 1" in alarm["text"]
+    assert f"Of the newest {len(answers)} parts {len(answers)} are out of tolerance" in alarm["text"]
+    assert "radius taken for diameter?" in alarm["text"]
+    assert "asked for" in alarm["text"]
+    run_jobs(server.database, JOBS)
+    assert [each["kind"] for each in shop.alarms() if each["kind"] == "unusual_gain"] == []
+    [known] = shop.tool(4)["gains"]
+    assert (shop.tool(4)["paused_by"], known["verdict"]) == (alarm["id"], "strong")
+    assert shop.call("GET", f"/machines/{shop.machine}/corrections?status=pending")["items"] == []
+    shop.call("PATCH", f"/characteristics/{loop.key}", parameters={"factor": -0.5}, reason="it is a radius")
+    done = shop.acknowledge(alarm["id"], "noted")
+    assert [each["code"] for each in done["outcome"]] == ["tool_resumed"]
+    assert [loop.part()["action"] for _part in range(2)] == ["correct", "none"]
+    assert shop.tool(4)["paused_by"] is None
+
+
 def test_an_offset_in_inches_is_found_from_two_corrections(shop: Shop, server: Any) -> None:
     """More are never made: the third would be of a millimetre, and is held as that of a worn tool."""
     loop = Loop(shop, 25.4)

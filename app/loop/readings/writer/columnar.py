@@ -19,6 +19,7 @@ from app.core.decision.loops import SERIES, Quiet, Series, quiet_run, rows_of
 from app.core.decision.step import CODES, Action
 from app.core.early import acts_early
 from app.core.gain import LONGEST, judge
+from app.core.overshoot import judge_strong
 from app.errors import InbandError
 from app.loop.readings.records import Entry, Record
 from app.loop.readings.schemas import ReadingIn
@@ -50,6 +51,7 @@ def compile_now() -> None:
     quiet_run(0, np.zeros(0), none, rows_of([]), none, np.zeros(0), Quiet.room(0))
     table([fixed(none, ">i8")], 0)
     judge(np.zeros(3), np.zeros(3), 1.0, 0, 1.0, 1.0)
+    judge_strong(np.zeros(3), np.zeros(3), 1.0, 0, 1.0, 1.0, 1.0)
     acts_early(np.zeros(3), np.zeros(3), np.zeros(3), 1.0, 0, 1.0)
 
 

@@ -1,7 +1,7 @@
-"""The guards before each correction: corrections that did the opposite of what they asked, or that act before they are counted.
+"""The guards before each correction: corrections that did the opposite of what they asked, or too much, or act before they are counted.
 
-Judged by `app.core.gain` and `app.core.early` on the newest parts of the stream (`PendingStream.parts`), when the next correction
-would go out; either pauses the tool. A reading that asks for nothing is not judged, it is only remembered: the quiet readings of a
+Judged by `app.core.gain`, `app.core.overshoot` and `app.core.early` on the newest parts of the stream (`PendingStream.parts`), when the
+next correction would go out; each pauses the tool. A reading that asks for nothing is not judged, it is only remembered: the quiet readings of a
 batch included (`columnar`).
 """
 
@@ -14,12 +14,13 @@ import numpy as np
 from app.core.decision.decide import Decision
 from app.core.decision.limits import Zone, nanometres
 from app.core.early import acts_early
-from app.core.gain import LONGEST, Step, against, expected_scatter, opposed
+from app.core.gain import LONGEST, Opposed, Step, against, expected_scatter, opposed
+from app.core.overshoot import Overshoot, overshoot
 from app.loop.readings.schemas import ReadingIn
 from app.loop.readings.writer.doubts import follow_statuses
 from app.loop.readings.writer.pending import PendingAlarm, PendingStream, PendingTool, PendingWrites
 from app.loop.readings.writer.snapshot import Part
-from app.loop.tables.tools import EARLY, OPPOSITE
+from app.loop.tables.tools import EARLY, OPPOSITE, STRONG
 
 
 def part_of(sequence: int, decision: Decision, compensated: float) -> Part:
@@ -36,7 +37,7 @@ def remember(stream: PendingStream, sequence: int, decision: Decision, compensat
 def pauses(
     pending: PendingWrites, stream: PendingStream, newest: Part | None, reading: ReadingIn, now: datetime
 ) -> PendingAlarm | None:
-    """Pause the tool if its corrections did the opposite of what they asked, or act before they are counted; the alarm, or None.
+    """Pause the tool if its corrections do the opposite of what they ask, or too much, or act before they are counted; the alarm.
 
     newest: what is left of the reading that asks for the next correction; None if none does.
     """
@@ -52,11 +53,12 @@ def pauses(
         np.array([part.compensated for part in parts]),
     )
     expected = expected_scatter(parameters.zero_range, parameters.averaging_limit)
-    found = opposed(deviation, compensated, parameters.factor, begin, expected, parameters.averaging_limit)
-    if found is not None:
-        steps = [_said(tool, step) for step in (found.first, found.second)]
-        gain = {"gain": round(found.gain, 3), "error": round(found.error, 3), "corrections": steps}
-        return paused(pending, stream, tool, newest.deviation, OPPOSITE, gain)
+    gauged = (deviation, compensated, parameters.factor, begin, expected, parameters.averaging_limit)
+    if (found := opposed(*gauged)) is not None:
+        return paused(pending, stream, tool, newest.deviation, OPPOSITE, _gain(tool, found))
+    if (strong := overshoot(*gauged, parameters.half)) is not None:
+        seen = {"parts": strong.parts, "out": strong.out}
+        return paused(pending, stream, tool, newest.deviation, STRONG, _gain(tool, strong) | seen)
     if parameters.rules.of_tool or not any(part.outstanding for part in parts):
         return None
     outstanding = np.array([part.outstanding for part in parts])
@@ -112,6 +114,11 @@ def name_correction(alarms: Sequence[PendingAlarm], stream: PendingStream, newes
     if found is not None:
         for alarm in alarms:
             alarm.data["against"] = _said(stream.tool, found)
+
+
+def _gain(tool: PendingTool, found: Opposed | Overshoot) -> dict[str, Any]:
+    steps = [_said(tool, step) for step in (found.first, found.second)]
+    return {"gain": round(found.gain, 3), "error": round(found.error, 3), "corrections": steps}
 
 
 def _said(tool: PendingTool, step: Step) -> dict[str, Any]:
