@@ -38,6 +38,17 @@ def constant_lag(received: Sequence[float], stated: Sequence[float]) -> float | 
     return lags[FEWEST // 2]
 
 
+def explained(lag: float, answered: float) -> bool:
+    """Tell if an answer about a lag explains this one: parts that are as long on their way, to within what may be read as even.
+
+    More by `LEAST` is another fault: a clock that went wrong since. A clock that jumps by as much shows in each lag to within `EVEN`.
+
+    >>> explained(7200, answered=7200), explained(7260, answered=7200), explained(600, answered=7200), explained(8100, answered=7200)
+    (True, True, True, False)
+    """
+    return lag - answered < LEAST - EVEN
+
+
 def behind_by(stated: float, not_before: float) -> float | None:
     """By how much, at least, a clock is behind that states this time for what cannot have been earlier; None where it may be right.
 

@@ -14,6 +14,7 @@ OPPOSITE = "opposite_effect"  # the alarm of corrections that did the opposite o
 STRONG = "strong_effect"  # that of corrections that act too strongly and drive parts out of tolerance
 EARLY = "early_effect"  # that of corrections that act before they are counted
 DOUBT = "correction_in_doubt"  # that of a reading whose correction_in_effect does not fit
+ASKED_AGAIN = 90  # days after the answer to such a doubt: a clock that was set may be set back in autumn
 OPPOSED = "opposite effect, alarm:"  # why corrections fell, as it is stored; the number of the alarm goes with it
 OVERSHOT = "strong effect, alarm:"
 COUNTED_LATE = "early effect, alarm:"

@@ -13,7 +13,7 @@ from app.loop.readings.records import Entry
 from app.loop.readings.schemas import ReadingIn
 from app.loop.readings.writer.columnar import decide_in_columns
 from app.loop.readings.writer.decide import decide_one_by_one, decide_reading
-from app.loop.readings.writer.doubts import leave_out_answered
+from app.loop.readings.writer.doubts import Answered, leave_out_answered
 from app.loop.readings.writer.pending import PendingCorrection, PendingWrites, Verdict
 from app.loop.readings.writer.snapshot import LoadedAverage, LoadedStream, LoadedTool, Snapshot
 from tests.shop import PARAMETERS
@@ -306,11 +306,47 @@ def test_what_was_answered_is_not_asked_again() -> None:
     machine = Machine(CUT, HOURS)
     while not machine.questions:
         machine.part()
-    for answered, left in (((1, 3, "clock", 0), 1), ((1, 0, "clock", 0), 0)):
-        pending = PendingWrites(machine.snapshot)
-        pending.raised = machine.questions[:1]
-        leave_out_answered(pending, [answered])
-        assert len(pending.raised) == left
+    for answered, left in ((Answered(1, 3, "clock", 0, 3600.0), 1), (Answered(1, 0, "clock", 0, 3600.0), 0)):
+        assert len(left_of(machine, answered)) == left
+
+
+def left_of(machine: Machine, answered: Answered) -> list[Any]:
+    """Questions of this machine that are asked although this was answered."""
+    pending = PendingWrites(machine.snapshot)
+    pending.raised = list(machine.questions)
+    leave_out_answered(pending, [answered])
+    return pending.raised
+
+
+@pytest.mark.parametrize("tells", [CUT])
+@pytest.mark.parametrize("buffer", [15, 24, 60, 90])
+def test_an_even_buffer_of_the_answered_length_is_never_asked_about_again(tells: tuple[str, ...], buffer: int) -> None:
+    """Nor where clock and pace scatter by some seconds, nor where the parts are less long on their way."""
+    for seed in range(3):
+        machine = Machine(tells, k=1 + seed % 2, seed=seed)
+        machine.buffer, machine.wear = buffer, 1.0
+        for _part in range(buffer + 80):
+            machine.behind = timedelta(seconds=abs(float(machine.chance.normal(0, 6))))
+            machine.part()
+        assert machine.questions
+        for minutes in (buffer, buffer + 0.3, buffer + 40):
+            assert left_of(machine, Answered(1, 0, "clock", 0, 60.0 * minutes)) == []
+
+
+@pytest.mark.parametrize("jump", [15, 30, 60, 600])
+@pytest.mark.parametrize("buffer", [16, 40])
+def test_a_clock_that_goes_wrong_after_the_answer_is_asked_about(buffer: int, jump: int) -> None:
+    for seed in range(3):
+        machine = Machine(CUT, k=1, seed=seed)
+        machine.buffer, machine.wear = buffer, 1.0
+        machine.run(buffer + 40)
+        answered = Answered(1, 0, "clock", 0, machine.questions[-1].data["lag"])
+        assert left_of(machine, answered) == []
+        machine.behind, machine.questions = timedelta(minutes=jump), []
+        machine.run(buffer + 60)
+        first = left_of(machine, answered)[0]
+        assert first.data["lag"] == pytest.approx(60 * (buffer + jump), abs=60)
+        assert first.sequence <= buffer + 60
 
 
 def test_after_a_tool_change_a_person_is_asked_although_all_times_are_of_one_clock() -> None:

@@ -1,13 +1,14 @@
 """Doubts about what a reading says of the corrections in effect: the number that it names cannot be right, or only perhaps.
 
 The reading is decided by its number all the same, which is the best that is known; the alarm asks what does not fit. Each doubt is
-raised once in 90 days: after its answer the machine may go on naming that number until it has applied the next one.
+raised once in 90 days: after its answer the machine may go on naming that number until it has applied the next one. What was answered
+of a clock holds for a lag like that one; a clock that goes wrong later is asked about again.
 """
 
 from collections.abc import Iterable, Iterator
-from typing import Any
+from typing import Any, NamedTuple
 
-from app.core.clock import behind_by
+from app.core.clock import behind_by, explained
 from app.loop.readings.schemas import ReadingIn
 from app.loop.readings.writer.pending import PendingAlarm, PendingStream, PendingTool, PendingWrites
 from app.loop.tables.tools import DOUBT
@@ -75,10 +76,26 @@ def follow_statuses(pending: PendingWrites, tool: PendingTool) -> None:
             pending.named[at] = named._replace(status=correction.status)
 
 
-def leave_out_answered(pending: PendingWrites, answered: Iterable[tuple[int, int, str, int]]) -> None:
-    """Drop doubts that have been answered. answered: machine, tool, why and number of each."""
-    known = set(answered)
-    gone = {id(alarm) for alarm in doubts(pending) if _key(alarm) in known}
+class Answered(NamedTuple):
+    """A doubt that somebody has answered. lag: of the clock that it was about, s; None if of none."""
+
+    machine_id: int
+    tool_memory: int
+    why: str
+    number: int
+    lag: float | None = None
+
+    def settles(self, alarm: PendingAlarm) -> bool:
+        """Tell if this alarm need not be raised after it."""
+        data = alarm.data
+        same = (alarm.machine_id, alarm.tool_memory or 0, data["why"], data.get("number", 0)) == self[:4]
+        return same and (self.lag is None or "lag" not in data or explained(data["lag"], self.lag))
+
+
+def leave_out_answered(pending: PendingWrites, answered: Iterable[Answered]) -> None:
+    """Drop doubts that have been answered."""
+    known = list(answered)
+    gone = {id(alarm) for alarm in doubts(pending) if any(each.settles(alarm) for each in known)}
     if gone:
         pending.raised = [alarm for alarm in pending.raised if id(alarm) not in gone]
         for verdict in pending.verdicts:
@@ -88,8 +105,3 @@ def leave_out_answered(pending: PendingWrites, answered: Iterable[tuple[int, int
 def doubts(pending: PendingWrites) -> Iterator[PendingAlarm]:
     """The doubts among the alarms that these readings raise."""
     return (alarm for alarm in pending.raised if alarm.kind == DOUBT)
-
-
-def _key(alarm: PendingAlarm) -> tuple[int, int, str, int]:
-    """The doubt that an answer to this alarm settles."""
-    return alarm.machine_id, alarm.tool_memory or 0, alarm.data["why"], alarm.data.get("number", 0)

@@ -12,7 +12,7 @@ from msgspec import structs
 from app.db.pipeline import Pipeline, Step
 from app.loop.readings.records import Entry, Record
 from app.loop.readings.writer.binary_copy import array_of_int4
-from app.loop.readings.writer.doubts import doubts, leave_out_answered
+from app.loop.readings.writer.doubts import Answered, doubts, leave_out_answered
 from app.loop.readings.writer.pending import PendingStream, PendingTool, PendingWrites, Verdict, alarm_number
 from app.loop.readings.writer.statements import (
     ACTIVE_ALARMS,
@@ -107,7 +107,14 @@ async def _number_alarms(pipeline: Pipeline, pending: PendingWrites, opening: li
     if any(doubts(pending)):
         *_opened, found = await pipeline.run([*opening, (ANSWERED_DOUBTS, array(machines))])
         answered = [
-            (int(machine or 0), int(tool or 0), (why or b"").decode(), int(n or 0)) for machine, tool, why, n in found
+            Answered(
+                int(machine or 0),
+                int(tool or 0),
+                (why or b"").decode(),
+                int(n or 0),
+                None if lag is None else float(lag),
+            )
+            for machine, tool, why, n, lag in found
         ]
         leave_out_answered(pending, answered)
         opening = []

@@ -17,7 +17,7 @@ from app.core.variants import Results
 from app.db.events import CHANNEL, PUBLISHED
 from app.loop.readings.records import Record
 from app.loop.readings.writer.snapshot import MOST_APPLIED
-from app.loop.tables.tools import DOUBT
+from app.loop.tables.tools import ASKED_AGAIN, DOUBT
 
 _json = msgspec.json.Encoder(enc_hook=list)  # a list that is shared by many rows
 
@@ -193,10 +193,9 @@ LEFT JOIN LATERAL (
 ) a ON p.after_alarm > 0
 WHERE p.every IS NOT NULL OR p.after_change > 0 OR p.after_alarm > 0
 """  # noqa: S608 - made of constants
-# Doubts that have been answered: each is raised once.
-ASKED_AGAIN = 90  # days after an answer: a clock that was set may be set back in autumn
+# Doubts that have been answered: each is raised once, that of a clock while it is no further behind.
 ANSWERED_DOUBTS = f"""
-SELECT machine_id, tool_memory, data ->> 'why', data ->> 'number' FROM alarm
+SELECT machine_id, tool_memory, data ->> 'why', data ->> 'number', data ->> 'lag' FROM alarm
 WHERE machine_id = ANY($1::int[]) AND characteristic_id IS NULL AND kind = '{DOUBT}'
     AND acknowledged_at > now() - make_interval(days => {ASKED_AGAIN})
 """  # noqa: S608 - made of constants
