@@ -23,7 +23,7 @@ that a machinist understands. The web layer makes RFC 9457 problem documents or 
 """
 
 import re
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from typing import Any, NamedTuple, Self
 
 from app.language.i18n import _
@@ -178,6 +178,11 @@ class Invalid(InbandError):
     def at(cls, field: str, wrong: str, *, do: str | None = None) -> Self:
         """Refusal of one field. wrong: without a capital and a full stop, for it follows the name of the field."""
         return cls(f"{field}: {wrong}.", do, errors=[FieldError(field, wrong)])
+
+    @classmethod
+    def of(cls, errors: Sequence[FieldError], do: str | None = None, *, said: int | None = None) -> Self:
+        """Refusal of several fields. said: how many of them the sentence names; all by default."""
+        return cls("; ".join(f"{field}: {message}" for field, message in errors[:said]), do, errors=errors)
 
     def as_problem(self) -> dict[str, Any]:
         """With the usual advice where it has none of its own."""

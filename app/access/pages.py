@@ -15,7 +15,7 @@ from app.access.sign_in import SignedIn, begin_session, sign_in, sign_out
 from app.db.engine import Database
 from app.errors import InbandError, Invalid, NotAllowed, TooManyRequests
 from app.language.i18n import _
-from app.web.deps import IN_TURN, SESSION_COOKIE, FormDep, SessionDep, SettingsDep, from_this_site
+from app.web.deps import IN_TURN, SESSION_COOKIE, FormDep, SessionDep, SettingsDep, from_this_site, keep_cookie
 from app.web.forms import by_field
 from app.web.limits import FEW, takes
 from app.web.problems import local_path
@@ -29,14 +29,7 @@ Next = Annotated[str, Query(alias="next", max_length=2000)]
 
 
 def _with_session(answer: Response, signed_in: SignedIn, settings: SettingsDep) -> Response:
-    answer.set_cookie(
-        SESSION_COOKIE,
-        signed_in.token,
-        max_age=settings.session_hours * 3600,
-        httponly=True,
-        samesite="lax",
-        secure=settings.secure_cookies,
-    )
+    keep_cookie(answer, settings, SESSION_COOKIE, signed_in.token, settings.session_hours * 3600)
     return answer
 
 
@@ -83,15 +76,8 @@ def send_sign_in(request: Request, form: FormDep, settings: SettingsDep) -> Resp
     log.info("%s signed in from %s", name.strip(), address)
     answer = _with_session(RedirectResponse(after, 303), signed_in, settings)
     if signed_in.device:
-        answer.set_cookie(
-            DEVICE_COOKIE,
-            signed_in.device,
-            max_age=round(queries.PLACE_KEPT.total_seconds()),
-            path="/sign-in",
-            httponly=True,
-            samesite="lax",
-            secure=settings.secure_cookies,
-        )
+        kept = queries.PLACE_KEPT.total_seconds()
+        keep_cookie(answer, settings, DEVICE_COOKIE, signed_in.device, kept, "/sign-in")
     return answer
 
 

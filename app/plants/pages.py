@@ -18,7 +18,7 @@ from app.language.i18n import _
 from app.plants.prefix import cookies_of
 from app.plants.serving import Plants, Served
 from app.plants.summary_queries import Summary, summary
-from app.web.deps import IN_TURN, SESSION_COOKIE, FormDep, SettingsDep, from_this_site
+from app.web.deps import IN_TURN, SESSION_COOKIE, FormDep, SettingsDep, from_this_site, keep_cookie
 from app.web.limits import FEW, takes
 from app.web.problems import is_for_programs
 from app.web.templates import page
@@ -62,14 +62,8 @@ async def send_sign_in(request: Request, form: FormDep, settings: SettingsDep) -
             refusal = error if refusal is None or isinstance(refusal, SignInRefused) else refusal
             continue
         signed_in = True
-        answer.set_cookie(
-            f"{SESSION_COOKIE}.{each.plant.key}",
-            session.token,
-            max_age=settings.session_hours * 3600,
-            httponly=True,
-            samesite="lax",
-            secure=settings.secure_cookies,
-        )
+        name_of = f"{SESSION_COOKIE}.{each.plant.key}"
+        keep_cookie(answer, settings, name_of, session.token, settings.session_hours * 3600)
     if signed_in or refusal is None:
         return answer
     return await _page(request, name=name, refusal=refusal)

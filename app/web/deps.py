@@ -5,7 +5,7 @@ from collections.abc import AsyncIterator, Iterator, Mapping
 from typing import Annotated, cast
 from urllib.parse import urlsplit
 
-from fastapi import Depends, Query, Request, params
+from fastapi import Depends, Query, Request, Response, params
 from pydantic import AfterValidator
 from sqlalchemy.orm import Session
 from starlette.datastructures import FormData
@@ -33,6 +33,19 @@ WRITTEN_COOKIE = "inband_written"
 """Place in the log of the database at which the last change of this browser ends; see `app.web.own_changes`."""
 EVENT_HEADER = "X-Inband-Event"
 """Number of the live event that made a page look again."""
+
+
+def keep_cookie(answer: Response, settings: Settings, name: str, value: str, seconds: float, path: str = "/") -> None:
+    """Let the browser keep a secret, which no script reads and no other site sends along."""
+    answer.set_cookie(
+        name,
+        value,
+        max_age=round(seconds),
+        path=path,
+        httponly=True,
+        samesite="lax",
+        secure=settings.secure_cookies,
+    )
 
 
 def may_read_replica(request: Request) -> None:

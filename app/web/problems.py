@@ -106,9 +106,7 @@ async def _validation(request: Request, error: Exception) -> Response:
         return answer(
             request, _method_not_allowed(request)
         )  # the word was taken for a number of the neighbour's address
-    errors = field_errors(error.errors()[:MOST_ERRORS])
-    detail = "; ".join(f"{field}: {message}" for field, message in errors[:3])
-    return answer(request, Invalid(detail, errors=errors))
+    return answer(request, Invalid.of(field_errors(error.errors()[:MOST_ERRORS]), said=3))
 
 
 async def _http(request: Request, error: Exception) -> Response:

@@ -12,7 +12,7 @@ from math import degrees, sqrt
 import numpy as np
 from numpy.typing import ArrayLike
 
-from app.core.geometry.points import STRAIGHT, Degenerate, Floats, Reason, extents, points_of
+from app.core.geometry.points import STRAIGHT, Degenerate, Fitted, Floats, Reason, extents, points_of
 
 LEAST_ARC = 30.0  # degrees: on a shorter arc the centre is thirty times less certain than a touch
 LARGEST = 1e4  # radii per extent of the points: as good as straight
@@ -21,7 +21,7 @@ ROUNDING = 1e-15  # of a distance: near the least sum of squares only the gradie
 
 
 @dataclass(frozen=True, eq=False, slots=True)
-class Circle:
+class Circle(Fitted):
     """A circle in its plane, mm. residuals: positive outside. arc: how much of the circle the points cover, degrees."""
 
     centre: Floats
@@ -29,11 +29,6 @@ class Circle:
     residuals: Floats
     arc: float
     cofactors: Floats  # of centre X, centre Y and radius: their covariance for touches with variance 1
-
-    @property
-    def rms(self) -> float:
-        """Root mean square of the radial distances, mm."""
-        return sqrt(float(np.mean(self.residuals**2)))
 
     @property
     def range(self) -> float:

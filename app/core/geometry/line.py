@@ -5,19 +5,18 @@ reach farthest (K. Pearson, 1901), the first right singular vector of the points
 """
 
 from dataclasses import dataclass
-from math import sqrt
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from app.core.geometry.points import Degenerate, Floats, Reason, extents, points_of, unit
+from app.core.geometry.points import Degenerate, Fitted, Floats, Reason, extents, points_of, unit
 
 PLANE, SPACE = 2, 3
 ROUND = 1e-9  # extents that differ by a smaller share do not say which direction is the line's
 
 
 @dataclass(frozen=True, eq=False, slots=True)
-class Line:
+class Line(Fitted):
     """A line and how far the points lie from it, mm.
 
     point: on the line, where the points' centroid is; direction: of length 1. residuals: in a plane signed, positive to
@@ -28,11 +27,6 @@ class Line:
     direction: Floats
     residuals: Floats
     along: Floats
-
-    @property
-    def rms(self) -> float:
-        """Root mean square of the distances, mm."""
-        return sqrt(float(np.mean(self.residuals**2)))
 
     @property
     def length(self) -> float:

@@ -5,16 +5,15 @@ points reach least (K. Pearson, 1901), the last right singular vector of the poi
 """
 
 from dataclasses import dataclass
-from math import sqrt
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from app.core.geometry.points import STRAIGHT, Degenerate, Floats, Reason, extents, points_of, unit
+from app.core.geometry.points import STRAIGHT, Degenerate, Fitted, Floats, Reason, extents, points_of, unit
 
 
 @dataclass(frozen=True, eq=False, slots=True)
-class Plane:
+class Plane(Fitted):
     """A plane and how far the points lie from it, mm.
 
     point: in the plane, where the points' centroid is. normal: of length 1, its greatest component positive.
@@ -24,11 +23,6 @@ class Plane:
     point: Floats
     normal: Floats
     residuals: Floats
-
-    @property
-    def rms(self) -> float:
-        """Root mean square of the distances, mm."""
-        return sqrt(float(np.mean(self.residuals**2)))
 
     @property
     def range(self) -> float:

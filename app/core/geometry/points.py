@@ -2,6 +2,7 @@
 
 from enum import StrEnum
 from itertools import pairwise
+from math import sqrt
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -26,6 +27,18 @@ class Reason(StrEnum):
     SHORT_ARC = "short_arc"
     NO_DIRECTION = "no_direction"
     NO_SOLUTION = "no_solution"
+
+
+class Fitted:
+    """An element through points, with the distance of each from it, mm: with a sign, or in space without."""
+
+    __slots__ = ()
+    residuals: Floats
+
+    @property
+    def rms(self) -> float:
+        """Root mean square of the distances, mm."""
+        return sqrt(float(np.mean(self.residuals**2)))
 
 
 class Degenerate(ValueError):

@@ -53,11 +53,7 @@ def period_of(fields: Mapping[str, str], zone: ZoneInfo | None = None) -> Period
         except cell_values.Unreadable as error:
             errors.append(FieldError(name, str(error)))
     if errors:
-        raise Invalid(
-            "; ".join(f"{error.field}: {error.message}" for error in errors),
-            _("Correct the named fields and send it again."),
-            errors=errors,
-        )
+        raise Invalid.of(errors, _("Correct the named fields and send it again."))
     period = Period(bounds["from"], bounds["to"])
     if period.bounded and period.start == period.end and cell_values.day(fields["to"]) is not None:
         raise backwards(fields["from"], fields["to"])  # the day after that day

@@ -25,9 +25,5 @@ def checked(body: MeasuringPlanIn) -> MeasuringPlan:
     plan = body.plan()
     errors = [FieldError(fault.field or "axes", sentence(fault)) for fault in faults(plan)]
     if errors:
-        raise Invalid(
-            "; ".join(f"{field}: {message}" for field, message in errors),
-            _("Correct the named fields; nothing was written."),
-            errors=errors,
-        )
+        raise Invalid.of(errors, _("Correct the named fields; nothing was written."))
     return plan

@@ -160,13 +160,12 @@ def _refuse(
             )
         )
     if wrong:
-        raise Invalid(
-            "; ".join(f"{error.field}: {error.message}" for error in wrong),
+        raise Invalid.of(
+            wrong,
             _(
                 "Choose another action, or correct the named fields. The alarm is still active. "
                 "Causes and corrective actions: GET /api/v1/reactions/catalogue."
             ),
-            errors=wrong,
         )
 
 
@@ -188,11 +187,7 @@ def _tool_replaced(session: Session, row: AlarmRow, comment: str, caller: Caller
         outcome.append({"code": "offset_assumed", "tool": tool.number, "offset": done.tool.offset})
     else:
         outcome += _far(before, offset)
-    if done.superseded:
-        outcome.append({"code": "corrections_superseded", "numbers": done.superseded})
-    if done.averages:
-        outcome.append({"code": "averages_restarted", "locations": done.averages})
-    return outcome
+    return outcome + _followed(done.superseded, done.averages)
 
 
 def _keep_cutting(session: Session, row: AlarmRow, comment: str, caller: Caller) -> Outcome:
@@ -255,11 +250,7 @@ def _sister_tool(session: Session, row: AlarmRow, comment: str, caller: Caller) 
     outcome: Outcome = [
         {"code": "switched", "tool": number, "sister": done.sister, "characteristics": done.characteristics}
     ]
-    if done.superseded:
-        outcome.append({"code": "corrections_superseded", "numbers": done.superseded})
-    if done.averages:
-        outcome.append({"code": "averages_restarted", "locations": done.averages})
-    return outcome
+    return outcome + _followed(done.superseded, done.averages)
 
 
 def _offset_set(
@@ -278,11 +269,13 @@ def _offset_set(
     if changed_by is not None:
         outcome[0]["changed_by"] = changed_by
     outcome += _far(before, true)
-    if done.superseded:
-        outcome.append({"code": "corrections_superseded", "numbers": done.superseded})
-    if done.averages:
-        outcome.append({"code": "averages_restarted", "locations": done.averages})
-    return outcome
+    return outcome + _followed(done.superseded, done.averages)
+
+
+def _followed(superseded: list[int], averages: list[int]) -> Outcome:
+    """Corrections that were superseded and averages that began again with another offset of a tool, if any."""
+    followed: Outcome = [{"code": "corrections_superseded", "numbers": superseded}] if superseded else []
+    return followed + ([{"code": "averages_restarted", "locations": averages}] if averages else [])
 
 
 def _far(before: float, offset: float) -> Outcome:

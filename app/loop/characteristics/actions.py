@@ -210,11 +210,7 @@ def _read(given: Mapping[str, Any], machine: Machine) -> Parameters:
 
 
 def _refused(errors: list[FieldError]) -> Invalid:
-    return Invalid(
-        "; ".join(f"{field}: {message}" for field, message in errors[:3]),
-        _("Correct the named fields and send them again; nothing was changed."),
-        errors=errors,
-    )
+    return Invalid.of(errors, _("Correct the named fields and send them again; nothing was changed."), said=3)
 
 
 def _refuse_moving(current: CurrentCharacteristic, change: CharacteristicChange) -> None:
@@ -228,7 +224,7 @@ def _refuse_moving(current: CurrentCharacteristic, change: CharacteristicChange)
             )
         )
     if errors:
-        raise Invalid("; ".join(f"{field}: {message}" for field, message in errors), errors=errors)
+        raise Invalid.of(errors)
 
 
 def _refuse_stale(current: CurrentCharacteristic, expected: int | None) -> None:

@@ -61,11 +61,7 @@ def _refuse_fewer(session: Session, machine: Machine, wanted: dict[str, Any]) ->
         if wanted.get(name, last) < last:
             errors.append(FieldError(name, _("location {last} is in use; say {last} or more").format(last=last)))
     if errors:
-        raise Invalid(
-            "; ".join(f"{field}: {message}" for field, message in errors),
-            _("Give the characteristics on it another location first, and set its offset to 0."),
-            errors=errors,
-        )
+        raise Invalid.of(errors, _("Give the characteristics on it another location first, and set its offset to 0."))
 
 
 def change_machine(session: Session, key: str, change: MachineChange, actor: str) -> Machine:

@@ -69,16 +69,7 @@ def exclude(session: Session, entry: Entry, sequence: int, actor: str, reason: s
         after={"excluded": True} | _withdraw(session, entry, sequence, actor, reason),
         why=reason,
     )
-    publish(
-        session,
-        {
-            "kind": "reading",
-            "machine": entry.machine,
-            "characteristic": entry.characteristic,
-            "sequence": sequence,
-            "excluded": True,
-        },
-    )
+    publish(session, entry.changed(sequence) | {"excluded": True})
     return exclusion
 
 
@@ -110,16 +101,7 @@ def exclude_all(session: Session, entry: Entry, sequences: Sequence[int], actor:
             after={"excluded": True, "sequences": excluded},
             why=reason,
         )
-        publish(
-            session,
-            {
-                "kind": "reading",
-                "machine": entry.machine,
-                "characteristic": entry.characteristic,
-                "sequence": excluded[-1],
-                "excluded": True,
-            },
-        )
+        publish(session, entry.changed(excluded[-1]) | {"excluded": True})
     return excluded
 
 

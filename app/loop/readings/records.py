@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 from datetime import datetime
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import msgspec
 
@@ -16,6 +16,15 @@ class Entry(NamedTuple):
     machine: str
     characteristic_id: int
     characteristic: str
+
+    def changed(self, sequence: int | None) -> dict[str, Any]:
+        """The live event of a reading that came, or is another now."""
+        return {
+            "kind": "reading",
+            "machine": self.machine,
+            "characteristic": self.characteristic,
+            "sequence": sequence,
+        }
 
 
 class Record(msgspec.Struct, frozen=True):

@@ -99,8 +99,4 @@ def _check(wanted: Wanted, fitting: Mapping[Place, tuple[RuleName, ...]], *, str
         if name not in fitting[place] and (strict or place is not Place.MAIN)
     ]
     if wrong:
-        raise Invalid(
-            "; ".join(f"{error.field}: {error.message}" for error in wrong),
-            _("Leave these rules off. Nothing was changed."),
-            errors=wrong,
-        )
+        raise Invalid.of(wrong, _("Leave these rules off. Nothing was changed."))

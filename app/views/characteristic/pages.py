@@ -3,7 +3,7 @@
 The live parts of the page are fetched one by one (header `X-Live-Part`), so nothing is looked up that is not shown.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from datetime import UTC, datetime
 from functools import cached_property
@@ -36,6 +36,7 @@ from app.loop.notes.queries import NEWEST, NoteRow
 from app.loop.readings import actions as readings
 from app.loop.readings import queries as reading_queries
 from app.loop.readings.by_hand.actions import measure_typed
+from app.loop.readings.records import Entry
 from app.loop.summaries import queries as statistics
 from app.loop.summaries import wording as statistics_wording
 from app.loop.summaries.queries import MOST_IN_HISTOGRAM, Window
@@ -250,16 +251,11 @@ def send_measured_by_hand(
     request: Request, session: SessionDep, caller: Operator, characteristic: str, sequence: Sequence_, form: FormDep
 ) -> Response:
     """Enter what was measured by hand on this part."""
-    current = queries.characteristic_named(session, characteristic)
-    entry = reading_queries.entry_named(session, characteristic)
-    try:
+
+    def measure(entry: Entry) -> None:
         measure_typed(session, entry, sequence, form, caller.name)
-    except InbandError as error:
-        if error.status == 404:
-            raise
-        session.expire_all()
-        return _reading(request, session, caller, current, sequence, typed=form, refusal=error)
-    return RedirectResponse(reading_link(characteristic, sequence), 303)
+
+    return _done_to(measure, request, session, caller, characteristic, sequence, form)
 
 
 @router.post("/characteristics/{characteristic}/readings/{sequence}/exclude")
@@ -267,11 +263,27 @@ def send_exclusion(
     request: Request, session: SessionDep, caller: Operator, characteristic: str, sequence: Sequence_, form: FormDep
 ) -> Response:
     """Take the reading out of the statistics."""
-    current = queries.characteristic_named(session, characteristic)
-    entry = reading_queries.entry_named(session, characteristic)
-    try:
+
+    def exclude(entry: Entry) -> None:
         reason = checked(Reason, form.get("reason", ""), "reason")
         readings.exclude(session, entry, sequence, caller.name, reason)
+
+    return _done_to(exclude, request, session, caller, characteristic, sequence, form)
+
+
+def _done_to(
+    do: Callable[[Entry], None],
+    request: Request,
+    session: Session,
+    caller: Caller,
+    characteristic: str,
+    sequence: int,
+    form: Mapping[str, str],
+) -> Response:
+    """Do something to a reading; its page, with the refusal where there is one."""
+    current = queries.characteristic_named(session, characteristic)
+    try:
+        do(reading_queries.entry_named(session, characteristic))
     except InbandError as error:
         if error.status == 404:
             raise

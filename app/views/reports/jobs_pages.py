@@ -1,6 +1,6 @@
 """Page: many reports at once – choose, watch, fetch, cancel."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from functools import partial
 from typing import Annotated
 
@@ -76,22 +76,21 @@ def _send(request: Request, session: Session, caller: Caller, form: FormData) ->
 @router.post("/reports/{number}/cancel")
 def send_cancellation(request: Request, session: SessionDep, caller: Viewer, number: Number) -> Response:
     """Cancel one."""
-    try:
-        with session.begin_nested():
-            actions.cancel(session, number, caller)
-    except InbandError as error:
-        if error.status == 404:
-            raise
-        return _page(request, session, caller, refusal=error)
-    return RedirectResponse("/reports#jobs", 303)
+    return _ended(request, session, caller, number, actions.cancel)
 
 
 @router.post("/reports/{number}/throw-away")
 def send_to_the_bin(request: Request, session: SessionDep, caller: Viewer, number: Number) -> Response:
     """Delete one that is finished."""
+    return _ended(request, session, caller, number, actions.throw_away)
+
+
+def _ended(
+    request: Request, session: Session, caller: Caller, number: Number, end: Callable[[Session, int, Caller], object]
+) -> Response:
     try:
         with session.begin_nested():
-            actions.throw_away(session, number, caller)
+            end(session, number, caller)
     except InbandError as error:
         if error.status == 404:
             raise

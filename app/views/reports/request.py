@@ -81,11 +81,7 @@ class ReportRequest:
         except (cell_values.Unreadable, ValueError) as error:
             errors.append(FieldError("timezone", str(error)))
         if errors:
-            raise Invalid(
-                "; ".join(f"{error.field}: {error.message}" for error in errors),
-                _("Correct the named fields and send it again."),
-                errors=errors,
-            )
+            raise Invalid.of(errors, _("Correct the named fields and send it again."))
 
     @property
     def newest(self) -> int | None:
@@ -139,11 +135,7 @@ def context_of(said: Mapping[str, str]) -> Chosen:
         if name not in set(ContextField)
     ]
     if errors:
-        raise Invalid(
-            "; ".join(f"{error.field}: {error.message}" for error in errors),
-            _("Correct the named fields."),
-            errors=errors,
-        )
+        raise Invalid.of(errors, _("Correct the named fields."))
     return chosen
 
 
@@ -172,8 +164,7 @@ def typed(fields: Mapping[str, str], sections: Sequence[str], context: Chosen = 
     if paper not in set(Paper):
         errors.append(FieldError("paper", _("must be one of: {names}").format(names=", ".join(Paper))))
     if errors:
-        detail = "; ".join(f"{error.field}: {error.message}" for error in errors)
-        raise Invalid(detail, _("Correct the named fields."), errors=errors)
+        raise Invalid.of(errors, _("Correct the named fields."))
     return ReportRequest(
         period=period,
         last=EVERYTHING if last == "all" else int(last) if last else None,

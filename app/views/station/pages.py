@@ -38,7 +38,17 @@ from app.views.characteristic.wording import state_word
 from app.views.station import context_pages, picture_pages, queries, sheet_pages
 from app.views.station.who import REFUSED, asked, who
 from app.views.station.wording import next_action
-from app.web.deps import SESSION_COOKIE, STATION_COOKIE, FormDep, Number, SessionDep, SettingsDep, Word, from_this_site
+from app.web.deps import (
+    SESSION_COOKIE,
+    STATION_COOKIE,
+    FormDep,
+    Number,
+    SessionDep,
+    SettingsDep,
+    Word,
+    from_this_site,
+    keep_cookie,
+)
 from app.web.fields import LARGEST_ID
 from app.web.forms import by_field, typed
 from app.web.limits import FEW, takes
@@ -85,15 +95,7 @@ def bind(request: Request, session: SessionDep, settings: SettingsDep, form: For
 
 def _keep(answer: Response, token: str, settings: Settings) -> None:
     """Keep the device bound for another while."""
-    answer.set_cookie(
-        STATION_COOKIE,
-        token,
-        max_age=round(devices.UNUSED.total_seconds()),
-        path="/station",
-        httponly=True,
-        samesite="lax",
-        secure=settings.secure_cookies,
-    )
+    keep_cookie(answer, settings, STATION_COOKIE, token, devices.UNUSED.total_seconds(), "/station")
 
 
 @router.get("/{machine}")

@@ -91,16 +91,7 @@ def measure(
         {"by_hand": result.measured, "good": result.good},
         result.comment,
     )
-    publish(
-        session,
-        {
-            "kind": "reading",
-            "machine": entry.machine,
-            "characteristic": entry.characteristic,
-            "sequence": sequence,
-            "by_hand": True,
-        },
-    )
+    publish(session, entry.changed(sequence) | {"by_hand": True})
     return measurement
 
 

@@ -273,8 +273,7 @@ def store_history(
     if summary.stored:
         counted = {"file": source, "readings": summary.stored, "first": summary.first_sequence}
         audit.record(session, actor, "readings imported", f"characteristic/{entry.characteristic}", None, counted)
-        change = {"kind": "reading", "machine": entry.machine, "characteristic": entry.characteristic}
-        publish(session, change | {"sequence": summary.last_sequence})
+        publish(session, entry.changed(summary.last_sequence))
     return summary
 
 

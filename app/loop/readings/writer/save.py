@@ -250,15 +250,7 @@ def full_blocks(spans: list[tuple[Entry, int, int]]) -> Iterable[tuple[str, list
 
 
 def _changes(pending: PendingWrites, touched: list[PendingStream]) -> list[dict[str, Any]]:
-    changes: list[dict[str, Any]] = [
-        {
-            "kind": "reading",
-            "machine": stream.entry.machine,
-            "characteristic": stream.entry.characteristic,
-            "sequence": stream.sequence,
-        }
-        for stream in touched
-    ]
+    changes: list[dict[str, Any]] = [stream.entry.changed(stream.sequence) for stream in touched]
     streams = {stream.entry.machine_id: stream.entry.machine for stream in touched}
     characteristics = {stream.entry.characteristic_id: stream.entry.characteristic for stream in touched}
     for tool in _tools(pending) if pending.touched_machines else ():
