@@ -53,5 +53,6 @@ def set_up(admin: Client) -> dict[str, int]:
 
 
 def _picture(admin: Client, content: str) -> str:
-    digest: str = admin.post("/reactions/pictures", {"content": content})["digest"]
+    """Store a picture. The first of a server takes long; the same one stored twice is one, so it may be tried again."""
+    digest: str = admin.post("/reactions/pictures", {"content": content}, repeat=True)["digest"]
     return digest
