@@ -41,13 +41,14 @@ def part_page(
 ) -> Response:
     """Everything measured on a part, newest first; without a name the field to look for one."""
     if part is None:
-        return page(request, "search/part.html", name=None, part=PageOfList([], None, None))
+        last = parts.last_measured(session)
+        return page(request, "search/part.html", name=None, part=PageOfList([], None, None), last=last)
     rows = parts.measured(session, part, after, ON_PAGE + 1)
     shown = rows[:ON_PAGE]
     here = part_path(part)
     more = urlencode({"after": cursor_of(shown[-1].record, Filters())}) if len(rows) > ON_PAGE else None
     listed = PageOfList(shown, f"{here}&{more}" if more else None, here if after else None)
-    return page(request, "search/part.html", name=part, part=listed, bar=tolerance_bar)
+    return page(request, "search/part.html", name=part, part=listed, last=[], bar=tolerance_bar)
 
 
 @router.get("/parts/{part:path}", dependencies=[require("viewer")])

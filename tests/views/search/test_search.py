@@ -7,7 +7,7 @@ import pytest
 from playwright.sync_api import Page, expect
 
 from tests.conftest import Server
-from tests.shop import Person, Shop
+from tests.shop import Person, Shop, unique
 
 pytestmark = pytest.mark.own_server
 
@@ -160,3 +160,14 @@ def test_by_keyboard(searched: Shop, viewer: Person, page: Page) -> None:
     page.wait_for_url("**/search?q=*")
     page.get_by_role("link", name=re.compile("^Lathe")).first.click()
     page.wait_for_url(f"**/machines/{searched.machine}")
+
+
+def test_without_a_name_the_parts_measured_last_are_listed(server: Server, viewer: Person) -> None:
+    shop, part = Shop(server), unique("Last")
+    shop.read(6.0, part=part)
+    shop.read(0.5, part=part)
+    text = viewer.open("/parts")
+    (row,) = re.findall(rf'<tr data-key="{part}".*?</tr>', text, re.DOTALL)
+    assert f'href="/parts?part={part}"' in row
+    assert "Full" in row, "the worst of its zones"
+    assert f'placeholder="{part}"' in text, "an example of the plant's own"
