@@ -66,7 +66,7 @@ def explanation(name: str) -> str | None:
             "The part from outside or inside (with the direction it says where the probe starts), or the tool itself: its length "
             "or radius tells its wear and, unless it is only measured, corrects its offset."
         ),
-        "nominal": _("As on the drawing. With a tolerance class, 40 h6 (ISO 286), the deviations follow from it."),
+        "nominal": _("As on the drawing; 40 h6 (ISO 286) fills in the deviations."),
         "target": _("Aimed at: the middle of the tolerance, or the natural limit."),
         "tolerance_width": _("Upper minus lower limit."),
         "natural_limit": _(
@@ -74,7 +74,7 @@ def explanation(name: str) -> str | None:
             "carries no index and no ppm. Not given: lower where nominal and lower deviation are 0 and nothing is corrected."
         ),
         "zero_range": _("Up to here a deviation is scatter: nothing is corrected."),
-        "averaging_limit": _("Up to here the running average decides. Empty: a third of the tolerance."),
+        "averaging_limit": _("Up to here the average decides. Empty: a third of the tolerance."),
         "wear_limit": _("From here on the tool is worn: an operator decides."),
         "confidence_limit": _("From here on probe or program is wrong: the decision is to stop."),
         "weighting_factor": _(
