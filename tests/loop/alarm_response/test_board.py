@@ -24,6 +24,14 @@ class TestWithoutScripts:
         assert "tool 3 is worn" in text
         assert '−330<span class="unit">µm' in text  # the held correction: 20 µm are on their way already
 
+    def test_its_readings_from_the_first_to_the_last(self, shop: Shop, operator: Person) -> None:
+        """A link is as wide as a finger: digits alone would leave a blank before what follows."""
+        shop.read(20.0)
+        shop.read(20.0)
+        (alarm,) = shop.alarms()
+        said = re.sub(r"\s+", " ", re.sub("<[^>]*>", "", operator.open(f"/alarms/{alarm['id']}")))
+        assert f"Seat {shop.characteristic}, from 1 to 2 Deviation" in said
+
     def test_two_steps_from_alarm_to_what_followed(self, shop: Shop, operator: Person) -> None:
         number = shop.read(350.0)["correction"]["number"]
         (alarm,) = shop.alarms()
