@@ -31,6 +31,7 @@ if TYPE_CHECKING:
 
     from app.db.rights import Rights
     from app.jobs.tables import JobFailure
+    from app.loop.notifications.tables import Receiver
     from app.plants.registry import Plant
     from app.settings import Settings
 
@@ -215,6 +216,7 @@ class _Condition(NamedTuple):
     revision: str | None = None
     todo: Sequence[str] = ()
     failing: "Sequence[JobFailure]" = ()
+    receivers: "Sequence[Receiver]" = ()
     rights: "Rights | None" = None
     bare: Sequence[str] = ()
     wrong: str = ""
@@ -226,6 +228,7 @@ def _condition(plant: "Plant | None", address: str, settings: "Settings") -> _Co
     from app.db import citus, migrate
     from app.db.rights import rights_of
     from app.jobs import queries as jobs
+    from app.loop.notifications.failing_queries import failing
 
     name = f"plant {plant.key}: " if plant else ""
     try:
@@ -239,6 +242,7 @@ def _condition(plant: "Plant | None", address: str, settings: "Settings") -> _Co
                 connection.scalar(text("SELECT current_schema()")) or "",
                 migrate.current(address),
                 failing=jobs.failures(session),
+                receivers=failing(session),
                 rights=rights_of(connection),
                 bare=citus.unprotected(driver) if citus.version(driver) else (),
             )
@@ -266,6 +270,11 @@ def _plant(found: _Condition) -> bool:
             f"{name}background job {failure.job} fails for {failure.subject or 'all'} since {failure.first_at:%Y-%m-%d %H:%M} UTC, "
             f"{failure.failures} time(s): {failure.error} It is tried again by itself at {failure.retry_at:%H:%M} UTC."
         )
+    for each in found.receivers:
+        _wrong(
+            f"{name}receiver {each.name} ({each.means}) is not reached, {each.failures} times in a row: {each.failure} "
+            "When it is repaired, send it a test: Set-up, Notifications."
+        )
     if not found.failing and not name:
         _well("background jobs", "none fails")
     if found.bare:
@@ -273,7 +282,7 @@ def _plant(found: _Condition) -> bool:
             f"{name}rights: nothing protects the facts in {', '.join(found.bare)} on their node. "
             "As the owner of the tables: `inband migrate`."
         )
-    return not found.failing and not found.bare
+    return not found.failing and not found.receivers and not found.bare
 
 
 def _rights(conditions: "Sequence[_Condition]", *, own: bool) -> bool:

@@ -17,6 +17,8 @@ GAP = timedelta(minutes=1)
 """Least time between two messages to one receiver, however many alarms come."""
 FIRST_PAUSE, LONGEST_PAUSE = timedelta(seconds=10), timedelta(minutes=10)
 """Before a receiver that could not be reached is tried again: twice the pause before, up to the longest."""
+ENOUGH_FAILURES = 4
+"""Failures in a row from which a receiver counts as one that fails: for over a minute, longer than a mail server takes to start again."""
 NEVER = timedelta(0)
 DAY = timedelta(days=1)
 

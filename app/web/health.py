@@ -21,6 +21,7 @@ from prometheus_client.registry import Collector
 from sqlalchemy import text
 from starlette.responses import Response
 
+from app.core.notify import ENOUGH_FAILURES
 from app.db.disk import free, is_full
 from app.db.engine import Database
 from app.db.replica import Replica
@@ -102,7 +103,11 @@ class Plant(Collector):
                 failing.add_metric([job], count)
                 if at is not None:
                     finished.add_metric([job], float(at))
-        return readings, latest, corrections, alarms, failing, finished
+            receivers = GaugeMetricFamily(
+                "inband_failing_receivers", "Receivers of notifications that are not reached, again and again."
+            )
+            receivers.add_metric([], session.scalar(text(_RECEIVERS), {"enough": ENOUGH_FAILURES}) or 0)
+        return readings, latest, corrections, alarms, failing, finished, receivers
 
 
 _READINGS = """
@@ -120,6 +125,11 @@ WHERE a.acknowledged_at IS NULL GROUP BY 1, 2
 _JOBS = """
 SELECT job, extract(epoch FROM r.finished_at), coalesce(f.failing, 0)
 FROM job_run r FULL JOIN (SELECT job, count(*) AS failing FROM job_failure GROUP BY job) f USING (job)
+"""
+
+_RECEIVERS = """
+SELECT count(*) FROM receiver r LEFT JOIN person p ON p.id = r.person_id
+WHERE r.failures >= :enough AND r.means <> 'browser' AND r.deleted_at IS NULL AND p.disabled_at IS NULL
 """
 
 

@@ -148,7 +148,8 @@ def change_receiver(
         raise Invalid.at("address", _("is not for browsers: an open page fetches"))
     if change.address is not None and change.address != row.address:
         _permitted(row.means, change.address, settings)
-        row.address, row.failures, row.retry_at = change.address, 0, None
+        row.address = change.address
+        row.works()
     if change.events and row.means != "webhook":
         raise Invalid.at("events", _("go to webhooks only"))
     if change.events is not None:

@@ -10,7 +10,10 @@ from app.language.numbers import as_read
 from app.loop.alarm_response import wording
 from app.loop.alarm_response.queries import AlarmRow
 from app.loop.alarm_response.reaction_queries import Reactions
+from app.loop.notifications.failing_wording import what_to_look_at
 from app.loop.notifications.means import Message
+from app.loop.notifications.tables import Receiver
+from app.loop.notifications.wording import means_word
 
 log = logging.getLogger(__name__)
 
@@ -125,6 +128,48 @@ def _as_json(row: AlarmRow, steps: Sequence[str], address: str) -> dict[str, Any
         "steps": steps,
         "link": _link(row, address),
     }
+
+
+def of_receivers(fail: Sequence[Receiver], address: str) -> Message:
+    """A message about receivers that fail, the longest first."""
+    first = fail[0].name
+    if len(fail) == 1:
+        subject = _("{name} is not reached: notifications do not arrive").format(name=first)
+    else:
+        text = _("{n} receivers are not reached: notifications do not arrive – {name} …")
+        subject = text.format(n=len(fail), name=first)
+    parts = [
+        "\n".join(filter(None, (_failing(row), row.failure, what_to_look_at(row)))) for row in fail[:MOST_IN_WORDS]
+    ]
+    link = f"{address}/setup/notifications#receivers"
+    if len(fail) > MOST_IN_WORDS:
+        parts.append(_("… and {n} more: {link}").format(n=len(fail) - MOST_IN_WORDS, link=link))
+    parts.append(_("An administrator repairs it, then presses Send a test: {link}").format(link=link))
+    said = [
+        {
+            "id": row.id,
+            "name": row.name,
+            "means": row.means,
+            "failing_since": row.failing_since,
+            "failures": row.failures,
+            "failure": row.failure,
+            "what_to_do": what_to_look_at(row),
+        }
+        for row in fail
+    ]
+    body = "\n\n".join(parts)
+    data = {"type": "receivers", "subject": subject, "text": body, "receivers": said, "link": link}
+    return Message(subject, body + "\n", data)
+
+
+def _failing(row: Receiver) -> str:
+    since = as_read(row.failing_since, "minutes") if row.failing_since else "–"
+    text = ngettext(
+        "{name} ({means}), since {since}, {n} failure:",
+        "{name} ({means}), since {since}, {n} failures in a row:",
+        row.failures,
+    )
+    return text.format(name=row.name, means=means_word(row.means), since=since, n=row.failures)
 
 
 def of_changes(changes: Sequence[Mapping[str, Any]], last: int, *, gap: bool) -> Message:

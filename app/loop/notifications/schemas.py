@@ -10,6 +10,7 @@ from pydantic_core import PydanticCustomError
 
 from app.core.notify import Hours, Route, Step
 from app.language.i18n import _
+from app.loop.notifications.failing_wording import what_to_look_at
 from app.loop.notifications.tables import Delivery, NotificationRoute, Receiver
 from app.web.fields import LARGEST_ID, Body, Moment, Slug, Text200, answer_from
 
@@ -219,7 +220,7 @@ class MessageOut(BaseModel):
     """A message that a page shows as a notification of its browser."""
 
     id: Annotated[int, Field(description="Number of the delivery.")]
-    about: Annotated[Literal["alarms", "test"], Field(description="Its content.")]
+    about: Annotated[Literal["alarms", "test", "receivers"], Field(description="Its content.")]
     subject: Annotated[str, Field(description="Its heading.")]
     words: Annotated[str, Field(description="What is wrong, and what to do.")]
     alarms: Annotated[list[int], Field(description="Numbers of the alarms in it.")]
@@ -230,7 +231,7 @@ class MessageOut(BaseModel):
     @classmethod
     def of(cls, row: Delivery) -> Self:
         """A message of the table."""
-        path = "/account/notifications"
+        path = "/todo" if row.about == "receivers" else "/account/notifications"
         if row.about == "alarms":
             path = f"/alarms/{row.alarms[0]}" if len(row.alarms) == 1 else "/alarms"
         return answer_from(cls, row, path=path)
@@ -256,6 +257,15 @@ class ReceiverOut(BaseModel):
     away_until: Annotated[datetime | None, Field(description="Nothing is sent before.")]
     events: Annotated[list[Changes], Field(description="Changes that it gets as they happen.")]
     failures: Annotated[int, Field(description="Failures in a row; 0: the last message arrived.")]
+    failing: Annotated[
+        bool,
+        Field(
+            description="It fails: from four failures in a row on, and others are notified of it. Never of browsers."
+        ),
+    ]
+    failing_since: Annotated[datetime | None, Field(description="The first of those failures.")]
+    failure: Annotated[str | None, Field(description="What was answered the last time, or why it was not reached.")]
+    what_to_do: Annotated[str | None, Field(description="The settings to look at; null where `failure` names them.")]
     retry_at: Annotated[datetime | None, Field(description="It is not tried again before.")]
     last_at: Annotated[datetime | None, Field(description="When a message about alarms was delivered last.")]
     shift_report: AtEndOfShift
@@ -265,7 +275,8 @@ class ReceiverOut(BaseModel):
     @classmethod
     def of(cls, row: Receiver) -> Self:
         """A receiver of the table, without its secret."""
-        return answer_from(cls, row, address=shown_address(row), person=row.person_id)
+        more = {"address": shown_address(row), "person": row.person_id, "failing": row.fails}
+        return answer_from(cls, row, **more, what_to_do=(what_to_look_at(row) or None) if row.failures else None)
 
 
 class NewReceiverOut(ReceiverOut):
@@ -288,10 +299,11 @@ class DeliveryOut(BaseModel):
 
     id: int
     receiver: Annotated[int, Field(description="Number of the receiver.")]
-    about: Annotated[Literal["alarms", "changes", "test", "shift"], Field(description="Its content.")]
+    about: Annotated[Literal["alarms", "changes", "test", "shift", "receivers"], Field(description="Its content.")]
     subject: Annotated[str, Field(description="Its heading.")]
     alarms: Annotated[list[int], Field(description="Numbers of the alarms in it.")]
     changes: Annotated[int, Field(description="How many changes are in it.")]
+    receivers: Annotated[list[int], Field(description="Numbers of the receivers that fail, which it reports.")]
     state: Annotated[
         Literal["waiting", "sending", "delivered", "failed", "lost"],
         Field(description="`lost`: the server ended meanwhile; it is sent again."),

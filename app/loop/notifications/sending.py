@@ -5,7 +5,7 @@ in it is sent again.
 """
 
 from collections import defaultdict
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
 from datetime import date, datetime, timedelta
 from functools import cache, partial
@@ -17,7 +17,7 @@ from sqlalchemy.orm import Session
 
 from app.access.queries import WITHOUT_ACCESS
 from app.core import notify
-from app.core.notify import NEVER, Notice, Raised, Record, Route, Step, notices, pause_after
+from app.core.notify import ENOUGH_FAILURES, NEVER, Notice, Raised, Record, Route, Step, notices, pause_after
 from app.db.events import publish
 from app.db.tables import Event
 from app.language.i18n import _
@@ -26,6 +26,7 @@ from app.loop.alarm_response.queries import ITS_CHARACTERISTIC, AlarmRow, alarm
 from app.loop.alarm_response.reaction_queries import Reactions, plans_in_force, trouble_of
 from app.loop.alarms.kinds import kind_named
 from app.loop.maintenance.queries import withheld_since
+from app.loop.notifications import failing_queries as failing
 from app.loop.notifications import message, queries
 from app.loop.notifications.calendar_queries import days_off as days_off_of
 from app.loop.notifications.group_schemas import group_of
@@ -77,6 +78,9 @@ def plan(session: Session, address: str, days_off: frozenset[date]) -> list[Job]
     about_alarms = _about_alarms(session, rows, free, address, days_off, now)
     free -= {job.receiver for job in about_alarms}
     jobs += about_alarms
+    about_receivers = _about_receivers(session, rows, free, address, now)
+    free -= {job.receiver for job in about_receivers}
+    jobs += about_receivers
     jobs += filter(None, (_about_changes(session, rows[number], address) for number in sorted(free)))
     for job in jobs:
         rows[job.receiver].busy_until = now + BUSY
@@ -157,12 +161,20 @@ def job_of(row: Delivery) -> Job:
     return Job(row.id, row.receiver_id, row.about, "browser", "", None, Message(row.subject, ""), tuple(row.alarms))
 
 
-def _job(session: Session, row: Receiver, about: str, made: Message, **more: Any) -> Job:
-    """Note that a delivery begins."""
+def _job(
+    session: Session, row: Receiver, about: str, made: Message, *, receivers: Sequence[int] = (), **more: Any
+) -> Job:
+    """Note that a delivery begins. receivers: numbers of those that it reports."""
     alarms = more.get("alarms", ())
     changes = len(made.data.get("changes", ()))
     delivery = Delivery(
-        receiver_id=row.id, about=about, subject=made.subject, alarms=list(alarms), changes=changes, state="sending"
+        receiver_id=row.id,
+        about=about,
+        subject=made.subject,
+        alarms=list(alarms),
+        changes=changes,
+        receivers=list(receivers),
+        state="sending",
     )
     session.add(delivery)
     session.flush()
@@ -334,6 +346,28 @@ def _record(session: Session, active: Iterable[Raised], same: Mapping[int, set[i
     return Record(known, of_causes)
 
 
+# --- receivers that fail
+
+
+def _about_receivers(
+    session: Session, rows: dict[int, Receiver], free: set[int], address: str, now: datetime
+) -> list[Job]:
+    """Messages to receivers that are reached about those that are not."""
+    due = failing.to_report(session, rows, free, _same_address(rows), now)
+    return [
+        _job(session, row, "receivers", message.of_receivers(fail, address), receivers=[each.id for each in fail])
+        for row, fail in due[:MOST_AT_ONCE]
+    ]
+
+
+def _was_reported(row: Receiver, numbers: Iterable[int], now: datetime) -> None:
+    """Note that a receiver has the message that these fail; what can hold back no other message is forgotten."""
+    kept = {
+        str(number): at.isoformat() for number, at in failing.reported_at(row).items() if at > now - timedelta(days=31)
+    }
+    row.reported = kept | {str(number): now.isoformat() for number in numbers}
+
+
 # --- changes
 
 
@@ -376,14 +410,19 @@ def end(session: Session, job: Job, answer: Answer) -> None:
     delivery.state = "delivered" if answer.delivered else "failed"
     delivery.ended_at, delivery.answer = now, answer.text
     row.busy_until = None
+    failed = row.failures >= ENOUGH_FAILURES
     if answer.delivered:
-        row.failures, row.retry_at = 0, None
+        row.works()
+        _was_reported(row, delivery.receivers, now)
         _arrived(session, row, job, now)
     else:
+        row.failing_since, row.failure = row.failing_since or now, answer.text
         row.failures += 1
         row.retry_at = now + pause_after(row.failures)
         if answer.perhaps and job.alarms:
             row.last_at = now  # it may have arrived: the next message waits its minute
+    if failed != (row.failures >= ENOUGH_FAILURES):
+        publish(session, {"kind": "notifications"})
     of_browser = {"person": row.person_id} if row.means == "browser" else {}
     publish(session, {"kind": "delivery", "id": job.delivery, **of_browser})
 

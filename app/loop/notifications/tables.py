@@ -10,6 +10,7 @@ from typing import Any
 from sqlalchemy import BigInteger, CheckConstraint, ForeignKey, Index, Sequence, func, text
 from sqlalchemy.orm import Mapped, mapped_column
 
+from app.core.notify import ENOUGH_FAILURES
 from app.db.base import Base
 
 RECEIVER_NUMBERS = Sequence("receiver_id", metadata=Base.metadata)
@@ -45,6 +46,11 @@ class Receiver(Base):
     events: Mapped[list[Any]] = mapped_column(server_default="[]")  # kinds of changes that a webhook gets
     cursor: Mapped[int] = mapped_column(BigInteger, server_default="0")  # the last event of the journal that it has
     failures: Mapped[int] = mapped_column(server_default="0")  # in a row
+    failing_since: Mapped[datetime | None]  # the first of them
+    failure: Mapped[str | None]  # the reason of the last of them
+    reported: Mapped[dict[str, Any]] = mapped_column(
+        server_default="{}"
+    )  # when it learnt that others fail, by their numbers
     retry_at: Mapped[datetime | None]
     busy_until: Mapped[datetime | None]  # a delivery is under way; later than that it counts as lost
     last_at: Mapped[datetime | None]  # of the last message about alarms
@@ -53,6 +59,15 @@ class Receiver(Base):
     created_at: Mapped[datetime] = mapped_column(server_default=func.now())
     created_by: Mapped[str]
     deleted_at: Mapped[datetime | None]
+
+    @property
+    def fails(self) -> bool:
+        """True if a person should look why. A browser that is closed shows nothing: that is no fault."""
+        return self.failures >= ENOUGH_FAILURES and self.means != "browser"
+
+    def works(self) -> None:
+        """It does not fail, or no longer, as far as is known."""
+        self.failures, self.retry_at, self.failing_since, self.failure = 0, None, None, None
 
 
 class NotificationRoute(Base):
@@ -109,14 +124,14 @@ class Announced(Base):
 
 
 class Delivery(Base):
-    """One attempt to deliver a message, and what was answered. alarms, changes: their numbers in it.
+    """One attempt to deliver a message, and what was answered. alarms, changes: their numbers in it; receivers: those that fail.
 
     words: of a message that a browser shows, which fetches it; None for other means.
     """
 
     __tablename__ = "delivery"
     __table_args__ = (
-        CheckConstraint("about IN ('alarms', 'changes', 'test', 'shift')", name="about"),
+        CheckConstraint("about IN ('alarms', 'changes', 'test', 'shift', 'receivers')", name="about"),
         CheckConstraint("state IN ('waiting', 'sending', 'delivered', 'failed', 'lost')", name="state"),
         Index("delivery_open_idx", "receiver_id", postgresql_where=text("state IN ('waiting', 'sending')")),
         Index("delivery_asked_idx", "asked_at"),
@@ -129,6 +144,7 @@ class Delivery(Base):
     words: Mapped[str | None]
     alarms: Mapped[list[Any]] = mapped_column(server_default="[]")
     changes: Mapped[int] = mapped_column(server_default="0")
+    receivers: Mapped[list[Any]] = mapped_column(server_default="[]")
     state: Mapped[str]
     asked_at: Mapped[datetime] = mapped_column(server_default=func.now())
     asked_by: Mapped[str | None]  # of a test

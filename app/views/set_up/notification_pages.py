@@ -16,6 +16,7 @@ from app.language.times import local
 from app.loop.alarms.kinds import kinds
 from app.loop.notifications import actions, browser_actions, queries
 from app.loop.notifications.calendar_queries import coming
+from app.loop.notifications.failing_wording import what_to_look_at
 from app.loop.notifications.schemas import OwnAddressIn, OwnBrowserIn, ReceiverIn, RouteIn, shown_address
 from app.loop.notifications.wording import (
     changes_word,
@@ -120,6 +121,7 @@ def _overview(
         changes=[(name, changes_word(name)) for name in ("alarm", "reading", "correction", "tool")],
         delivery_word=delivery_word,
         shown_address=shown_address,
+        what_to_look_at=what_to_look_at,
     )
 
 

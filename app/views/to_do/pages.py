@@ -6,6 +6,7 @@ from fastapi import APIRouter, Query, Request, Response
 
 from app.access.deps import Viewer, require
 from app.loop.machines import queries as machines
+from app.loop.notifications.failing_queries import failing
 from app.loop.tools import verbs
 from app.views.to_do import queries
 from app.web.deps import Number, SessionDep, Word
@@ -55,3 +56,9 @@ def to_do_page(
 def count(request: Request, session: SessionDep) -> Response:
     """The number beside *To do* in the bar."""
     return page(request, "to_do_count.html", to_do=queries.count(session))
+
+
+@router.get("/todo/not-reached", dependencies=[require("viewer")])
+def not_reached(request: Request, session: SessionDep) -> Response:
+    """The note about receivers that fail, for the page of the alarms."""
+    return page(request, "to_do/not_reached.html", not_reached=failing(session))

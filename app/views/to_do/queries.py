@@ -1,4 +1,5 @@
-"""Everything that waits for a person: active alarms, corrections to decide about, parts set aside, open proposals, background jobs that fail. Never writes.
+"""Everything that waits for a person: active alarms, corrections to decide about, parts set aside, open proposals, receivers and background
+jobs that fail. Never writes.
 
 A held correction is part of the alarm that holds it and counts only where none does. A calibration that is overdue and a
 fixture that has shifted are alarms. The count is the same for everybody, whatever their role.
@@ -20,6 +21,9 @@ from app.loop.alarm_response import queries as alarms
 from app.loop.alarm_response import wording
 from app.loop.alarms.reading_kinds import HOLDING
 from app.loop.characteristics.queries import parameters_of
+from app.loop.notifications import failing_queries as failing
+from app.loop.notifications.failing_wording import what_to_look_at
+from app.loop.notifications.wording import means_word
 from app.loop.quarantine import queries as quarantine
 from app.loop.quarantine.tables import Quarantine
 from app.loop.tables.alarms import Alarm
@@ -31,12 +35,14 @@ from app.quality.what_if import queries as what_if
 from app.quality.what_if.tables import ParameterProposal
 from app.web.states import word_of
 
-Kind = Literal["alarm", "correction", "quarantine", "proposal", "job"]
+Kind = Literal["alarm", "correction", "quarantine", "proposal", "receiver", "job"]
 MOST = 200  # of each kind, on one page
 
 
 class Task(NamedTuple):
-    """One thing that waits. state: for its badge; about: what it is about; role: those who have it, or a higher one, may do it; number: of a correction."""
+    """One thing that waits. state: for its badge; about: what it is about; role: those who have it, or a higher one, may do it; number: of a correction;
+    detail: more, for those who may do it alone.
+    """
 
     kind: Kind
     state: str
@@ -49,6 +55,7 @@ class Task(NamedTuple):
     path: str
     role: Role
     number: int | None = None
+    detail: str = ""
 
 
 def _held_alone() -> ColumnElement[bool]:
@@ -73,6 +80,7 @@ COUNT: Select[int] = select(
     + select(func.count()).select_from(Correction).where(_TO_DECIDE).scalar_subquery()
     + quarantine.OPEN_COUNT.scalar_subquery()
     + select(func.count()).where(ParameterProposal.status == "open").scalar_subquery()
+    + failing.COUNT.scalar_subquery()
     + select(func.count()).select_from(JobFailure).scalar_subquery()
 )
 
@@ -83,7 +91,7 @@ def count(session: Session) -> int:
 
 
 def count_by_machine(session: Session) -> dict[int, int]:
-    """Number of things that wait at each machine, by its id; background jobs belong to none."""
+    """Number of things that wait at each machine, by its id; receivers and background jobs belong to none."""
     waiting = union_all(
         select(Alarm.machine_id).where(Alarm.acknowledged_at.is_(None)),
         select(Correction.machine_id).where(_TO_DECIDE),
@@ -96,8 +104,10 @@ def count_by_machine(session: Session) -> dict[int, int]:
 
 def tasks(session: Session, machine: Machine | None = None, caller: Caller | None = None) -> list[Task]:
     """All that waits, alarms first, the most urgent of them, then the oldest of each kind: at one machine, or what one person's role may do."""
-    found = [*_alarms(session, machine), *_corrections(session, machine), *_quarantines(session, machine)]
-    found += _proposals(session, machine)
+    found = list(_alarms(session, machine))
+    if machine is None:
+        found += _receivers(session)
+    found += [*_corrections(session, machine), *_quarantines(session, machine), *_proposals(session, machine)]
     if machine is None:
         found += _jobs(session)
     return [task for task in found if caller is None or caller.may(task.role)]
@@ -203,6 +213,26 @@ def _proposals(session: Session, machine: Machine | None) -> Iterator[Task]:
                 path=f"/proposals/{row.proposal.id}",
                 role="engineer",
             )
+
+
+def _receivers(session: Session) -> Iterator[Task]:
+    for rows in failing.causes(failing.failing(session)):
+        first, more = rows[0], len(rows) - 1
+        named = ngettext("{name} and {n} more", "{name} and {n} more", more).format(name=first.name, n=more)
+        detail = f"{means_word(first.means)}: {first.failure} {what_to_look_at(first)}"
+        yield Task(
+            kind="receiver",
+            state="probe_fault",
+            word=_("Not reached"),
+            machine=None,
+            about=named if more else first.name,
+            sentence=_("Notifications do not arrive: alarms may reach nobody."),
+            since=first.failing_since or first.created_at,
+            action=_("Look"),
+            path="/setup/notifications#receivers",
+            role="admin",
+            detail=detail.strip(),
+        )
 
 
 def _jobs(session: Session) -> Iterator[Task]:
