@@ -126,6 +126,16 @@ def by_field(error: InbandError, at: Callable[[str, str], tuple[str, str]] = lam
     return FieldErrors(messages)
 
 
+def of_lists(errors: Mapping[str, str], words: Mapping[str, str]) -> list[str]:
+    """Errors of lists that have no field of their own. words: the name of each as the form has it.
+
+    >>> of_lists({"name": "Is missing", "steps": "Must have at least one entry"}, {"steps": "Steps"})
+    ['Steps: must have at least one entry']
+    """
+    wrong = ((re.split(r"[.\[]", field)[0], text) for field, text in errors.items())
+    return [f"{words[name]}: {text[:1].lower()}{text[1:]}" for name, text in wrong if name in words]
+
+
 def length(text: str | None) -> float | str | None:
     """A length in mm as people type it, with a decimal point or comma; what is not a number is left for the schema to refuse.
 

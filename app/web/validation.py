@@ -75,6 +75,8 @@ def message(error: Mapping[str, Any]) -> str:
     }.get(kind)
     if simple is not None:
         return simple
+    if kind.startswith("date_"):
+        return _("must be a day, for example 2026-11-21")
     if kind.startswith(("datetime", "date", "time")):
         return _("must be a time with its offset from UTC, for example 2026-11-21T08:15:02+01:00")
     if kind in {"enum", "literal_error"}:
@@ -114,9 +116,13 @@ def _with_values(kind: str, context: Mapping[str, Any]) -> str | None:
         "less_than": _("must be less than {lt}"),
         "less_than_equal": _("must be at most {le}"),
         "string_pattern_mismatch": _("must have the form {pattern}"),
-        "too_long": _("must have at most {max_length} items, not {actual_length}"),
+        "too_long": _("must have at most {max_length} entries, not {actual_length}"),
         "text_too_long": _("must have at most {max_length} characters, not {actual_length}"),
-        "too_short": _("must have at least {min_length} items"),
+        "too_short": (
+            _("must have at least one entry")
+            if context.get("min_length") == 1
+            else _("must have at least {min_length} entries")
+        ),
     }
     sentence = sentences.get(kind)
     return None if sentence is None else sentence.format(**{name: _plain(value) for name, value in context.items()})

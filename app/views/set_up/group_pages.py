@@ -16,7 +16,7 @@ from app.loop.notifications.calendar_schemas import CalendarIn
 from app.loop.notifications.group_schemas import EVERY_DAY, GroupIn, GroupOut
 from app.views.set_up.frame import setup_page
 from app.web.deps import FormDep, SessionDep
-from app.web.forms import by_field, parsed, ticked_numbers
+from app.web.forms import by_field, of_lists, parsed, ticked_numbers
 
 router = APIRouter(include_in_schema=False)
 MOST_TURNS = 6
@@ -82,7 +82,7 @@ def _group(
         number=number,
         form=form,
         errors=errors,
-        other_errors=[text for field, text in errors.items() if field.startswith(("members", "rota"))],
+        other_errors=of_lists(errors, {"members": _("Members"), "rota": _("Rota")}),
         fits=number is None or len(queries.group(session, number).rota) <= MOST_TURNS,
         receivers=queries.receivers(session),
         shifts=[("", _("By hours"))]

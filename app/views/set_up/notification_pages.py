@@ -29,7 +29,7 @@ from app.loop.notifications.wording import (
 )
 from app.views.set_up.frame import setup_page
 from app.web.deps import Before, FormDep, SessionDep, SettingsDep, get_settings
-from app.web.forms import by_field, parsed, ticked, ticked_numbers, whole
+from app.web.forms import by_field, of_lists, parsed, ticked, ticked_numbers, whole
 from app.web.paging import address, part_of
 from app.web.states import word_of
 from app.web.templates import page
@@ -209,7 +209,10 @@ def _route(
         fits=fits,
         form=form,
         errors=errors,
-        other_errors=[text for field, text in errors.items() if field.startswith(("steps", "hours", "kinds", "tones"))],
+        other_errors=of_lists(
+            errors,
+            {"steps": _("Steps"), "hours": _("Open"), "kinds": _("Kinds of alarms"), "tones": _("How urgent")},
+        ),
         kinds=sorted(((kind.name, kind.word()) for kind in kinds()), key=lambda kind: kind[1]),
         tones=tones(),
         receivers=queries.receivers(session),

@@ -21,7 +21,7 @@ from app.loop.reactions.schemas import MOST_STEPS, CatalogueEntryIn, ReactionPla
 from app.loop.summaries.wording import rule_name
 from app.views.set_up.frame import setup_page
 from app.web.deps import FormDep, SessionDep
-from app.web.forms import by_field, parsed, typed
+from app.web.forms import by_field, of_lists, parsed, typed
 from app.web.limits import MEGABYTE, takes
 from app.web.pictures import FilesDep, SentFile, pictures_of
 
@@ -190,7 +190,7 @@ def _plan(
         versions=queries.versions(session, row.id) if row else [],
         form=form,
         errors=errors,
-        other_errors=[text for field, text in errors.items() if field.startswith(("steps", "receivers"))],
+        other_errors=of_lists(errors, {"steps": _("Steps"), "receivers": _("Who must be notified")}),
         kinds=sorted(((kind.name, kind.word()) for kind in kinds()), key=lambda kind: kind[1]),
         rules=[(rule.value, rule_name(rule)) for rule in RuleName],
         characteristics=[

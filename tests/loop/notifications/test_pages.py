@@ -175,3 +175,10 @@ def test_what_ones_own_form_does_not_hold_is_kept(server: Server, page: str, fie
     viewer.send(f"/account/notifications{page}", **fields | shown | {"quiet-begins": "21:00", "quiet-ends": "05:00"})
     changed = viewer.browser.get(path).json()
     assert (len(changed["quiet"]), changed["away_until"]) == (1, set_up["away_until"])
+
+
+def test_a_refused_form_names_the_list_that_is_empty_and_the_day_that_is_none(admin: Person) -> None:
+    assert "Steps: must have at least one entry" in admin.send("/setup/notifications/routes/new", 422, name="Nobody")
+    assert "Members: must have at least one entry" in admin.send("/setup/notifications/groups/new", 422, name="Empty")
+    page = admin.send("/setup/notifications/days-off", 422, country="", days="2026-12-24\n31.31.2026")
+    assert "Must be a day, for example 2026-11-21" in page
