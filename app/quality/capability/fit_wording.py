@@ -3,7 +3,7 @@
 from app.core.spc.distributions import Family
 from app.core.spc.fitting import FITS, Choice, Fit, Fitted, why
 from app.language.i18n import _
-from app.language.numbers import fixed, in_percent
+from app.language.numbers import fixed, in_percent, signed
 
 
 def name(family: Family) -> str:
@@ -29,7 +29,7 @@ def parameters(fit: Fit) -> str:
         case Family.HALF_NORMAL | Family.RAYLEIGH:
             return _("scale {scale} µm").format(scale=um("scale"))
         case Family.FOLDED_NORMAL:
-            return _("mean {mean} µm, scale {scale} µm").format(mean=um("mean"), scale=um("scale"))
+            return _("mean {mean} µm, scale {scale} µm").format(mean=signed(p["mean"] * 1000, 2), scale=um("scale"))
         case Family.LOGNORMAL:
             return _("median {median} µm, s of the logarithm {s}").format(
                 median=f"{p['median'] * 1000:.2f}", s=fixed(p["s"], 3)
@@ -40,8 +40,8 @@ def parameters(fit: Fit) -> str:
             return _("{share} % at {first} ± {one} µm, {rest} % at {second} ± {other} µm").format(
                 share=in_percent(p["share"]),
                 rest=in_percent(1 - p["share"]),
-                first=um("first_mean"),
-                second=um("second_mean"),
+                first=signed(p["first_mean"] * 1000, 2),
+                second=signed(p["second_mean"] * 1000, 2),
                 one=um("first_sigma"),
                 other=um("second_sigma"),
             )
