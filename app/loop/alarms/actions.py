@@ -71,6 +71,13 @@ def raise_for_place(session: Session, machine_id: int, kind: AlarmKind, data: di
     return _raised(session, active or Alarm(machine_id=machine_id, kind=kind.name), data)
 
 
+def raise_for_machine(session: Session, machine_id: int, kind: AlarmKind, data: dict[str, Any]) -> Alarm:
+    """Raise an alarm about a machine, as of its clock, or count one more if it is active already; the machine is locked."""
+    of_machine = (Alarm.tool_memory.is_(None), Alarm.characteristic_id.is_(None))
+    active = _active(session, machine_id, kind, *of_machine)
+    return _raised(session, active or Alarm(machine_id=machine_id, kind=kind.name), data)
+
+
 def _raised(session: Session, alarm: Alarm, data: dict[str, Any]) -> Alarm:
     """A new alarm is kept; on one that is active already, one more is counted."""
     if alarm in session:

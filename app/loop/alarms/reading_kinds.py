@@ -12,6 +12,7 @@ from app.language.numbers import NOTHING, age, as_read, read_um, tolerance_um
 from app.loop.alarms.kinds import AlarmKind, register
 from app.loop.readings.wording import first_move_sentence, touch_problem
 from app.loop.tables.alarms import Alarm
+from app.loop.tables.characteristics import Characteristic
 from app.loop.tables.connections import Connection
 
 
@@ -38,14 +39,21 @@ def _against(alarm: Alarm) -> str:
     """A sentence where the edge is not the cause, perhaps: the newest correction moved the size the wrong way, or a clock is behind."""
     if "lag" in alarm.data:
         text = _(
-            "By machined_at the part was cut {lag} before the reading came in, without corrections that are applied by now: if it was "
-            "cut later, the clock of the machine is behind."
+            "By the time of cutting that the machine sends, the part was cut {lag} before the reading came in, without corrections that "
+            "are applied by now: if it was cut later, the clock of the machine is behind."
         )
         return " " + text.format(lag=age(alarm.data["lag"]))
     if "against" not in alarm.data:
         return ""
     text = _("The size went the wrong way: {step}. Check the sign of the factor and the offset register.")
     return " " + text.format(step=moved_by(alarm.data["against"], alarm.data.get("limit")))
+
+
+def called(alarm: Alarm) -> str:
+    """The name of the characteristic that an alarm of a tool or machine speaks of; its key where nobody can look."""
+    key, session = str(alarm.data.get("characteristic")), object_session(alarm)
+    name = select(Characteristic.name).where(Characteristic.machine_id == alarm.machine_id, Characteristic.key == key)
+    return (None if session is None else session.scalar(name)) or key
 
 
 def _so_far(alarm: Alarm) -> str:

@@ -264,7 +264,7 @@ def _lag(record: Record) -> str:
     if record.correction_in_effect is not None or lag < LONG_BEFORE:
         return ""
     return " " + _(
-        "By its machined_at it was cut %(age)s before it came in: if the machine's clock is behind, corrections that were applied "
+        "By the time of cutting that the machine sends, it was cut %(age)s before it came in: if the machine's clock is behind, corrections that were applied "
         "since then were in effect."
     ) % {"age": age(lag)}
 

@@ -25,7 +25,7 @@ from app.loop.machines.queries import lock_machines
 from app.loop.tables.alarms import Alarm
 from app.loop.tables.machines import Machine
 from app.loop.tables.tools import Correction, Tool, ToolEvent
-from app.loop.tools import queries, wording
+from app.loop.tools import queries, stated_times, wording
 from app.loop.tools.actions import Decided, locked, record_status
 from app.loop.tools.alarm_kinds import OFFSET_DIFFERS
 from app.loop.tools.events import alarm_raised, tool_changed
@@ -51,6 +51,7 @@ def mark_applied(
     too. Any other offset than the expected one raises *offset differs*, becomes the known offset and pauses the tool; so
     does one that a machine reports with a correction that may not be in the offset. mapping: hash of the mapping by which
     a bridge converted it for the control.
+    An `applied_at` before the correction was issued raises *correction in doubt*.
     Raises `NotFound`; `Conflict` for a correction that is not pending, or when another offset is reported the second time.
     """
     correction = locked(session, machine, number)
@@ -73,6 +74,8 @@ def mark_applied(
     together = _with_others(session, machine, tool, correction, offset_after)
     now = datetime.now(UTC)
     at = min(now, applied_at or now)
+    if applied_at is not None:
+        stated_times.ask_of_time(session, machine, correction, applied_at)
     for pending in together:
         before, tool.offset = tool.offset, rounded(tool.offset + pending.amount)
         tool.total = rounded(tool.total + pending.amount)

@@ -5,7 +5,7 @@ from datetime import datetime
 from app.language.i18n import _
 from app.language.numbers import PLUS_MINUS, age, as_read, fixed, signed, um
 from app.loop.alarms.kinds import AlarmKind, register
-from app.loop.alarms.reading_kinds import moved_by, uncorrected
+from app.loop.alarms.reading_kinds import called, moved_by, uncorrected
 from app.loop.tables.alarms import Alarm
 from app.loop.tables.tools import DOUBT, EARLY, OPPOSITE, STRONG
 
@@ -16,7 +16,7 @@ def _opposed(alarm: Alarm) -> str:
         "Two corrections in a row moved {characteristic} the wrong way: {steps}. The gain is {gain} {pm} {error}, it should be "
         "1. Nothing is corrected through tool {tool} until this alarm is answered."
     ).format(
-        characteristic=data.get("characteristic"),
+        characteristic=called(alarm),
         steps="; ".join(map(moved_by, data.get("corrections", ()))),
         gain=signed(data.get("gain"), 2),
         pm=PLUS_MINUS,
@@ -60,7 +60,7 @@ def _too_strong(alarm: Alarm) -> str:
         gain=signed(data.get("gain"), 2),
         pm=PLUS_MINUS,
         error=fixed(data.get("error"), 2),
-        characteristic=data.get("characteristic"),
+        characteristic=called(alarm),
         steps="; ".join(map(moved_by, data.get("corrections", ()))),
         n=data.get("parts"),
         out=data.get("out"),
@@ -95,13 +95,13 @@ STRONG_EFFECT = register(
 def _behind(alarm: Alarm) -> str:
     data = alarm.data
     text = _(
-        "In each of the newest {n} readings of {characteristic} measured_at lies {lag} before its receipt: the clock of the machine is "
-        "behind, or each reading waits as long on its way."
+        "In each of the newest {n} readings of {characteristic} the time of measuring that the machine sends lies {lag} before its receipt: "
+        "the clock of the machine is behind, or each reading waits as long on its way."
     )
     if data.get("number") is not None:
         text = _(
-            "A reading of {characteristic} names correction {number}, which was issued {lag} after its part was cut by machined_at: the "
-            "clock of the machine is behind by as much or more, or the number is not that of the part."
+            "A reading of {characteristic} names correction {number}, which was issued {lag} after its part was cut, by the time that the "
+            "machine sends: the clock of the machine is behind by as much or more, or the number is not that of the part."
         )
     counted = _(
         "Parts count as cut without corrections that tool {tool} had. Nothing is corrected through it until this alarm is answered."
@@ -111,7 +111,7 @@ def _behind(alarm: Alarm) -> str:
             "Parts count as cut before tool {tool} was changed. Nothing is corrected through it until this alarm is answered."
         )
     return f"{text} {counted}".format(
-        characteristic=data.get("characteristic"),
+        characteristic=called(alarm),
         lag=age(data.get("lag") or 0.0),
         n=data.get("readings"),
         number=data.get("number"),
@@ -124,8 +124,12 @@ def _early(alarm: Alarm) -> str:
     if data.get("by") == "clock":
         return _behind(alarm)
     than = {
-        "machined_at": _("machined_at says ({lag} before the reading came in): the clock of the machine is behind"),
-        "correction_in_effect": _("correction_in_effect says: the number sent is not that of the last one applied"),
+        "machined_at": _(
+            "the time of cutting that the machine sends says ({lag} before the reading came in): the clock of the machine is behind"
+        ),
+        "correction_in_effect": _(
+            "the number that the machine sends says: it is not that of the last correction applied"
+        ),
     }.get(str(data.get("by")), _("they are confirmed: what is applied is reported late, or never"))
     return _(
         "Corrections of tool {tool} act earlier than {than}. {share} {pm} {error} of what counted as outstanding was in the sizes of "
@@ -136,7 +140,7 @@ def _early(alarm: Alarm) -> str:
         share=signed(data.get("share"), 2),
         pm=PLUS_MINUS,
         error=fixed(data.get("error"), 2),
-        characteristic=data.get("characteristic"),
+        characteristic=called(alarm),
         n=data.get("after"),
     )
 
@@ -148,8 +152,9 @@ EARLY_EFFECT = register(
         word=lambda: _("Early effect"),
         sentence=uncorrected(_early),
         what_to_do=lambda: _(
-            "Set the clock of the machine, or send correction_in_effect in place of machined_at; confirm each correction before the "
-            "next part is cut. Then answer the alarm: what was before it no longer counts."
+            "Set the clock of the machine, or let it send the number of the last correction in place of the time of cutting "
+            "(correction_in_effect, machined_at); confirm each correction before the next part is cut. Then answer the alarm: what was "
+            "before it no longer counts."
         ),
         tone="stop",
         icon="waiting",
@@ -164,22 +169,25 @@ EARLY_EFFECT = register(
 )
 
 
+MOMENTS = ("applied_at", "machined_at", "issued_at")
+
+
 def _in_doubt(alarm: Alarm) -> str:
     data = alarm.data
     if data["why"] == "clock":
         text = _(
-            "In each of the newest {n} readings of {characteristic} machined_at lies {lag} before its receipt: corrections that were "
-            "applied since then count as missing from the parts. That is right if each part is as long on its way to the gauge. If the "
+            "In each of the newest {n} readings of {characteristic} the time of cutting that the machine sends lies {lag} before its receipt: "
+            "corrections that were applied since then count as missing from the parts. That is right if each part is as long on its way to the gauge. If the "
             "clock of the machine is behind, they are taken back, or follow the wear by half."
         )
         if data.get("before"):
             text = _(
-                "In each of the newest {n} readings of {characteristic} machined_at lies {lag} before its receipt: the parts count as cut "
-                "before tool {of_tool} was changed, and correct nothing. That is right if each part is as long on its way to the gauge, "
+                "In each of the newest {n} readings of {characteristic} the time of cutting that the machine sends lies {lag} before its "
+                "receipt: the parts count as cut before tool {of_tool} was changed, and correct nothing. That is right if each part is as long on its way to the gauge, "
                 "and wrong if the clock of the machine is behind."
             )
         return text.format(
-            characteristic=data.get("characteristic"),
+            characteristic=called(alarm),
             lag=age(data.get("lag") or 0.0),
             n=data.get("readings"),
             of_tool=data.get("of_tool"),
@@ -189,16 +197,24 @@ def _in_doubt(alarm: Alarm) -> str:
             "held": _("it is held"),
             "awaiting_approval": _("it awaits approval"),
             "rejected": _("it was rejected"),
-        }.get(str(data.get("status")), _("it has fallen"))
+        }.get(str(data.get("status")), _("it was dropped before it was applied"))
         return _(
-            "Correction {number} cannot be in effect, as a reading of {characteristic} says: {fell}. If the control has added "
-            "it to tool {of_tool} all the same, the offset differs from what Inband counts."
-        ).format(**data, fell=fell)
-    moments = {name: as_read(datetime.fromisoformat(data[name])) for name in ("machined_at", "issued_at")}
-    return _(
-        "A reading of {characteristic} names correction {number}, which was issued after its part was cut: at {issued_at}, the "
-        "part by machined_at at {machined_at}. Either the clock of the machine is behind, or the number is not that of the part."
-    ).format(**data | moments)
+            "A reading of {characteristic} says that its part was cut with correction {number}. That cannot be: {fell}. If the control has "
+            "added it to tool {of_tool} all the same, the offset differs from what Inband counts."
+        ).format(**data | {"characteristic": called(alarm)}, fell=fell)
+    moments = {name: as_read(datetime.fromisoformat(data[name])) for name in data if name in MOMENTS}
+    if data["why"] == "applied_before":
+        text = _(
+            "The machine says that it applied correction {number} of tool {of_tool} before it was issued. It was issued at {issued_at}, "
+            "and applied at {applied_at} by the time that the machine sends. Either the clock of the machine is behind by {lag} or "
+            "more, or it names another correction."
+        )
+        return text.format(**data | moments | {"lag": age(data.get("lag") or 0.0)})
+    text = _(
+        "A reading of {characteristic} names correction {number}, which was issued at {issued_at}. By the time that the machine sends, "
+        "its part was cut before, at {machined_at}. Either the clock of the machine is behind, or the number is not that of the part."
+    )
+    return text.format(**data | moments | {"characteristic": called(alarm)})
 
 
 CORRECTION_IN_DOUBT = register(
@@ -208,8 +224,9 @@ CORRECTION_IN_DOUBT = register(
         word=lambda: _("Correction in doubt"),
         sentence=_in_doubt,
         what_to_do=lambda: _(
-            "Look at what the machine sends as correction_in_effect, and at its clock: measured_at beside machined_at shows if it is behind. "
-            "Read the offset at the control; if it differs, enter it under Tools."
+            "Look at the number of the last correction that the machine sends (correction_in_effect), and at its clock: the time of measuring "
+            "beside that of cutting (measured_at, machined_at) shows if it is behind. Read the offset at the control; if it differs, "
+            "enter it under Tools."
         ),
         icon="waiting",
         comments={

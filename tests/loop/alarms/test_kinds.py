@@ -79,6 +79,7 @@ DATA: dict[str, list[dict[str, Any]]] = {
         for more in (
             {"why": "fell", "status": "rejected"},
             {"why": "not_issued", "machined_at": _AT, "issued_at": _AT},
+            {"why": "applied_before", "applied_at": _AT, "issued_at": _AT, "lag": 7200.0},
             {"why": "clock", "lag": 7200.0, "readings": 5},
             {"why": "clock", "lag": 7200.0, "readings": 5, "before": True},
         )

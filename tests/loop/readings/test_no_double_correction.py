@@ -222,7 +222,9 @@ class TestByMachinedAt:
         assert "machined_at" not in before["reason"]["text"]
         slow = shop.read(1.0, machined_at=at(-130))
         assert slow["outstanding"] == [1]
-        assert "By its machined_at it was cut 2 h" in slow["reason"]["text"], "a clock that is behind is named"
+        assert "By the time of cutting that the machine sends, it was cut 2 h" in slow["reason"]["text"], (
+            "a clock that is behind is named"
+        )
 
 
 class TestApproval:

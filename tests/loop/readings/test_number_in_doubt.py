@@ -26,8 +26,7 @@ def test_one_that_was_rejected_is_asked_about_once(shop: Shop) -> None:
     assert answer["outstanding"] == []
     (alarm,) = doubts(shop)
     assert answer["alarms"] == [{"id": alarm["id"], "kind": "correction_in_doubt"}]
-    assert f"Correction {number} cannot be in effect" in alarm["text"]
-    assert "it was rejected" in alarm["text"]
+    assert f"says that its part was cut with correction {number}. That cannot be: it was rejected" in alarm["text"]
     assert alarm["tool_memory"] == 3
     shop.acknowledge(alarm["id"], "noted")
     assert shop.read(0.5, correction_in_effect=number)["alarms"] == []
@@ -67,8 +66,39 @@ def test_a_part_that_was_cut_before_it_was_issued(shop: Shop) -> None:
     answer = shop.read(0.5, correction_in_effect=number, machined_at=cut.isoformat())
     assert answer["outstanding"] == [], "the number is what counts"
     (alarm,) = doubts(shop)
-    assert f"names correction {number}, which was issued after its part was cut" in alarm["text"]
+    assert f"names correction {number}, which was issued at " in alarm["text"]
+    assert "its part was cut before, at " in alarm["text"]
+    assert f"A reading of Seat {shop.characteristic} names" in alarm["text"], "its name, not its key"
     assert "the clock of the machine is behind" in alarm["text"]
+
+
+def applied(shop: Shop, ago: timedelta) -> Any:
+    """A correction that the machine says to have applied so long ago, although it is of now."""
+    shop.call("POST", f"/machines/{shop.machine}/tools/3/change", offset=0.0, reason="new")
+    at = (datetime.now(UTC) - ago).isoformat()
+    return shop.correction(issued(shop), "applied", client=shop.machine_client, applied_at=at)
+
+
+def test_a_correction_that_was_applied_before_it_was_issued(shop: Shop) -> None:
+    """It cannot be true: the clock is behind. The time is kept as it was said, for the parts are told by the same clock."""
+    done = applied(shop, timedelta(hours=2))
+    assert done["status"] == "applied"
+    assert datetime.fromisoformat(done["applied_at"]) < datetime.fromisoformat(done["created_at"])
+    (alarm,) = doubts(shop)
+    assert alarm["tool_memory"] is None
+    assert f"says that it applied correction {done['number']} of tool 3 before it was issued." in alarm["text"]
+    assert "is behind by 2 h or more" in alarm["text"]
+    shop.acknowledge(alarm["id"], "noted")
+    applied(shop, timedelta(hours=2, minutes=5))
+    assert doubts(shop) == [], "as it was answered"
+    applied(shop, timedelta(hours=3))
+    assert len(doubts(shop)) == 1, "it went wrong by more since"
+
+
+def test_a_time_of_applying_that_may_be_true_is_not_asked_about(shop: Shop) -> None:
+    applied(shop, timedelta(seconds=30))
+    applied(shop, timedelta(seconds=-30))
+    assert doubts(shop, "all") == []
 
 
 def test_numbers_of_all_tools_are_one_order(shop: Shop) -> None:
