@@ -3,6 +3,7 @@
 A machine with six tools (`bench.outcome`): two with two characteristics, one with a sister, one without a location.
 """
 
+import random
 from collections.abc import Callable, Mapping
 from functools import partial
 from pathlib import Path
@@ -18,7 +19,7 @@ from app.loop.tools.untaken import Watch
 from app.simulators.controls.model import UNMAPPED, Model, Steps
 from app.simulators.controls.mqtt import mosquitto
 from app.simulators.controls.opcua import Nc
-from bench.outcome import Play, Process
+from bench.outcome import TOLERANCE, Play, Process
 from tests.bridge.test_outcome import START, applied, play
 from tests.conftest import TLS, Server
 from tests.loop.connections.test_alarms import gap, later
@@ -178,6 +179,27 @@ def named(one: Play, mistake: str) -> None:
                 assert tool is None or f"tool {tool}" in each["text"]
 
 
+def reported(one: Play) -> None:
+    """Assert that the parts that are out are those that the wear alone takes out, and that *oversize* has counted every one."""
+    told = {each["characteristic"]: each["count"] for each in said(one) if each["kind"] == "oversize"}
+    assert "undersize" not in {each["kind"] for each in said(one)}
+    for number in one.judged:
+        sizes = one.process.sizes[number]
+        out = [part for part, size in enumerate(sizes, 1) if abs(size) > TOLERANCE]
+        assert out == worn_out(one, number), "no correction has made it worse"
+        assert 15 <= len(out) <= 17, "of twenty: the first is 6 µm off and the fourth 2 µm more"
+        assert abs(told[one.keys[number]] - len(out)) <= 1, "a size on the limit is rounded at the control"
+
+
+def worn_out(one: Play, number: int) -> list[int]:
+    """The parts that are out of tolerance where nothing corrects the tool."""
+    process = one.process
+    feature = next(each for each in process.features if each.number == number)
+    scatter = (random.Random(f"{number} {part}").gauss(0.0, feature.noise) for part in range(1, one.parts + 1))
+    sizes = (process.start + feature.wear * part + chance for part, chance in enumerate(scatter, 1))
+    return [part for part, size in enumerate(sizes, 1) if abs(size) > TOLERANCE]
+
+
 @pytest.mark.parametrize("mistake", sorted(MISTAKES.keys() - {"no effect"}))  # that takes too many parts
 def test_each_mistake_ends_in_the_alarm_that_names_it(
     server: Server, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, mistake: str
@@ -196,6 +218,8 @@ def test_over_each_way_in(
 ) -> None:
     one = after(server, tmp_path, monkeypatch, mistake, way)
     named(one, mistake)
+    if mistake == "no effect":
+        reported(one)
     if mistake == "wrong sign":
         assert max(applied(one).values()) <= 2
     if mistake == "server away":
@@ -211,5 +235,7 @@ def test_at_a_control_that_works_in_inches(
 ) -> None:
     one = after(server, tmp_path, monkeypatch, mistake, way, Unit.INCH)
     named(one, mistake)
+    if mistake == "no effect":
+        reported(one)
     if mistake == "wrong sign":
         assert max(applied(one).values()) <= 2

@@ -218,6 +218,13 @@ def test_an_offset_that_does_next_to_nothing_is_reported(
     raised = alarms(one)
     assert raised["unusual_gain"] | raised.get("opposite_effect", set()) >= {1, 2, 3, 4, 5}
     out = {OWNERS[number - 1] for number, _ in found.out}
+    lost = Counter(number for number, _ in found.out)
+    assert max(lost.values()) <= 40 - 14, "the first parts wear by less than the tolerance"
+    if amiss == 0.0:
+        assert min(lost[number] for number in one.judged) >= 40 - 18
+    said = one.call("GET", f"/alarms?state=active&kind=oversize&limit=200&machine={one.machine}")["items"]
+    counted = {each["characteristic"]: each["count"] for each in said}
+    assert all(abs(counted[one.keys[number]] - parts) <= 1 for number, parts in lost.items()), "each is reported"
     assert out >= ({3, 4, 5} if amiss else {1, 2, 3, 4, 5})
     assert raised["oversize"] - {UNMAPPED} == out
 
