@@ -1,8 +1,8 @@
 """A verb: something a person does to one thing, declared once.
 
 A room declares its verbs. Each is drawn as a page that asks and does (`draw_question`), as a dialog and at a station
-(`Verb.question`, `carry_out`) and as a JSON route (`draw`); the button, the sentence afterwards and the form follow from the declaration. The savepoint, "somebody was first"
-and "sent twice" are here and nowhere else.
+(`Verb.question`, `carry_out`) and as a JSON route (`draw`); the button, the sentence afterwards and the form follow from the
+declaration. The role it needs, the savepoint, "somebody was first" and "sent twice" are here and nowhere else.
 """
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
@@ -21,8 +21,30 @@ from app.web.forms import typed
 from app.web.templates import page
 
 
+class Actor(Protocol):
+    """Who acts: a person, a key with a person's role, or a machine's own key."""
+
+    @property
+    def machine_id(self) -> int | None:
+        """The machine whose own key it is, or None."""
+        ...
+
+    def may(self, role: Any) -> bool:
+        """Tell if the actor has this role or a higher one."""
+        ...
+
+    def must(self, role: Any) -> None:
+        """Raises `NotAllowed` unless the actor `may`."""
+        ...
+
+
 class Subject(Protocol):
     """A thing with its caller and session, and the words for it in sentences."""
+
+    @property
+    def caller(self) -> Actor:
+        """Who acts on it."""
+        ...
 
     @property
     def session(self) -> Session:
@@ -98,6 +120,7 @@ class Act(Generic[On, Sent]):
     """One act on one kind of thing.
 
     act: does it; raises `Conflict` when the thing does not permit it any more. Its name and docstring describe the JSON route.
+    role: which people may do it, at least; nobody else is offered it.
     own: after a `Conflict`, tells if the caller had done the same before. asks_again: tells if a `Conflict` is a new warning to
     be shown with the question. needs_body: False where JSON may leave it out.
     by_machine: a machine's own key may do it.
@@ -110,6 +133,17 @@ class Act(Generic[On, Sent]):
     asks_again: Callable[[Conflict], bool] = lambda _error: False
     needs_body: bool = True
     by_machine: bool = False
+    role: Literal["operator", "engineer", "admin"] = "operator"
+
+    def permits(self, caller: Actor) -> bool:
+        """Tell if the caller has the role for it."""
+        return caller.may(self.role)
+
+    def do(self, on: On, sent: Sent) -> Any:
+        """Do it. Raises `NotAllowed` for a caller who may not."""
+        if not (self.by_machine and on.caller.machine_id is not None):
+            on.caller.must(self.role)
+        return self.act(on, sent)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -149,11 +183,14 @@ class Verb(Act[On, Sent]):
 
 
 def carry_out(verb: Act[On, Sent], on: On, form: Mapping[str, str]) -> Outcome:
-    """Do what the form asks for, or nothing of it; sent twice by one person it is done once. Raises `Invalid`, `NotFound`."""
+    """Do what the form asks for, or nothing of it; sent twice by one person it is done once.
+
+    Raises `Invalid`, `NotAllowed`, `NotFound`.
+    """
     sent, usual = typed(verb.body, form), Said(verb.name, on.number)
     try:
         with on.session.begin_nested():
-            result = verb.act(on, sent)
+            result = verb.do(on, sent)
     except Conflict as error:
         on.session.expire_all()
         if verb.asks_again(error):
@@ -221,6 +258,7 @@ def draw_question(
         return ask(request, template, question, form, error, **around(on, verb))
 
     def question(request: Request, on: Any) -> Response:
+        on.caller.must(asked(request, on).role)
         return shown(request, on)
 
     def answer(request: Request, on: Any, form: FormDep) -> Response:
@@ -237,16 +275,26 @@ def draw_question(
 
 
 def draw(
-    router: APIRouter, path: str, verb: Act[On, Any], subject: Any, answer: Callable[[On, Any], Any], model: Any
+    router: APIRouter,
+    path: str,
+    verb: Act[On, Any],
+    subject: Any,
+    answer: Callable[[On, Any], Any],
+    model: Any,
+    asks: Sequence[Any] = (),
 ) -> None:
-    """Add the JSON route that does it. subject: the dependency that finds the thing; answer: from it and what `act` returns."""
+    """Add the JSON route that does it.
+
+    subject: the dependency that finds the thing; answer: from it and what `act` returns; asks: dependencies that refuse callers
+    before their body is looked at.
+    """
     body: Any = verb.body if verb.needs_body else verb.body | None
 
     def route(on: Any, sent: Any = None) -> Any:
-        return answer(on, verb.act(on, sent if sent is not None else verb.body()))
+        return answer(on, verb.do(on, sent if sent is not None else verb.body()))
 
     route.__name__, route.__doc__ = verb.act.__name__, verb.act.__doc__
     route.__annotations__ = {"on": Annotated[Any, Depends(subject)], "sent": body, "return": model}
     if verb.needs_body:
         route.__defaults__ = None
-    router.post(path, responses=problems(404, 409))(route)
+    router.post(path, responses=problems(404, 409), dependencies=asks)(route)

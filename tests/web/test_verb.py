@@ -2,18 +2,21 @@
 
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Annotated, Any, Literal
 
 import httpx
 import pytest
 from fastapi import FastAPI
 
-from app.errors import Conflict, Invalid, NotFound
+from app.access.callers import Caller
+from app.errors import Conflict, Invalid, NotAllowed, NotFound
 from app.web.api import api_router
 from app.web.fields import Body, Length, Reason
 from app.web.verb import Size, Verb, carry_out, draw, named, said
 from tests.loops import run
+
+ANA = Caller("person", "ana", "operator")
 
 
 class Transaction:
@@ -41,7 +44,7 @@ class OfDoor:
     """A door, and who acts on it."""
 
     number: int = 7
-    caller: str = "ana"
+    caller: Caller = ANA
     closed_by: list[str] = field(default_factory=list)
     session: Any = field(default_factory=Transaction)
 
@@ -62,7 +65,7 @@ def close_door(on: OfDoor, how: CloseIn) -> str:
     on.session.written.append("closing")
     if on.closed_by and not how.forced:
         raise Conflict("It is closed.", "Nothing is left to do.", warned=how.gap)
-    on.closed_by.append(on.caller)
+    on.closed_by.append(on.caller.name)
     return f"closed {how.reason}"
 
 
@@ -70,7 +73,7 @@ CLOSE: Verb[OfDoor, CloseIn] = Verb(
     name="close",
     body=CloseIn,
     act=close_door,
-    own=lambda on: on.closed_by == [on.caller],
+    own=lambda on: on.closed_by == [on.caller.name],
     asks_again=lambda error: error.more["warned"] is not None,
     word=lambda: "Close",
     title=lambda _on: "Close door {number}?",
@@ -113,6 +116,28 @@ class TestCarryOut:
             carry_out(CLOSE, on, form)
         assert [error.field for error in refused.value.errors] == [wrong]
         assert (on.closed_by, on.session.written) == ([], [])
+
+
+class TestRole:
+    MACHINE = Caller("machine", "lathe-1", machine_id=1)
+
+    def test_a_lower_role_does_nothing(self) -> None:
+        on = OfDoor()
+        engineers = replace(CLOSE, role="engineer")
+        with pytest.raises(NotAllowed, match="needs the role engineer; ana has the role operator"):
+            carry_out(engineers, on, {"reason": "Cold"})
+        assert (on.closed_by, on.session.written) == ([], [])
+        assert (CLOSE.permits(ANA), engineers.permits(ANA)) == (True, False)
+
+    def test_a_machine_does_its_own_alone(self) -> None:
+        on = OfDoor(caller=self.MACHINE)
+        with pytest.raises(NotAllowed, match="key of machine"):
+            carry_out(CLOSE, on, {"reason": "Cold"})
+        assert carry_out(replace(CLOSE, by_machine=True), on, {"reason": "Cold"}).kind == "done"
+
+    def test_a_machines_own_act_asks_people_for_the_role(self) -> None:
+        with pytest.raises(NotAllowed):
+            carry_out(replace(CLOSE, by_machine=True, role="engineer"), OfDoor(), {"reason": "Cold"})
 
 
 def test_the_question_is_drawn_from_the_declaration() -> None:

@@ -55,11 +55,6 @@ class OfBackup:
         return {"number": self.number}
 
 
-def _undo(on: OfRun, why: ReasonIn) -> RunRow:
-    on.caller.must("engineer")
-    return actions.undo(on.session, on.number, why.reason, on.caller)
-
-
 def _confirming(on: OfRun) -> list[str]:
     row = on.row
     if row.status != "to_confirm":
@@ -115,7 +110,8 @@ RUN: tuple[Verb[OfRun, Any], ...] = (
     Verb(
         name="undo",
         body=ReasonIn,
-        act=_undo,
+        act=lambda on, why: actions.undo(on.session, on.number, why.reason, on.caller),
+        role="engineer",
         word=lambda: _("Undo entry"),
         title=lambda _on: _("Undo the entry of run {number}?"),
         follows=_undoing,
@@ -157,6 +153,7 @@ RESTORE: Verb[OfBackup, RestoreIn] = Verb(
     name="restore",
     body=RestoreIn,
     act=_restore,
+    role="engineer",
     word=lambda: _("Put back"),
     title=lambda _on: _("Put back kinematics {number}?"),
     follows=_restoring,

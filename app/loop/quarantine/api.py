@@ -6,7 +6,7 @@ from typing import Annotated, Any
 from fastapi import Path, Query, Response
 
 from app.access.audit.actions import record
-from app.access.deps import AnyCaller, Engineer, Operator
+from app.access.deps import AnyCaller, Operator, require
 from app.files.documents.content import Format
 from app.files.documents.files import MEDIA_TYPES
 from app.loop.machines.queries import only_machine
@@ -115,11 +115,7 @@ def get_quarantine_file(
     return download(content, f"quarantine-{quarantine}.{as_.value}", MEDIA_TYPES[as_])
 
 
-def _part(session: SessionDep, caller: Operator, quarantine: Number, number: PartNumber) -> OfPart:
-    return OfPart(session, quarantine, number, caller)
-
-
-def _part_to_release(session: SessionDep, caller: Engineer, quarantine: Number, number: PartNumber) -> OfPart:
+def _part(session: SessionDep, caller: AnyCaller, quarantine: Number, number: PartNumber) -> OfPart:
     return OfPart(session, quarantine, number, caller)
 
 
@@ -128,7 +124,8 @@ for _verb in PART:
         router,
         f"/quarantines/{{quarantine}}/parts/{{number}}/{_verb.name}",
         _verb,
-        _part_to_release if _verb.name == "release" else _part,
+        _part,
         lambda _on, row: QuarantinedPartOut.of(row),
         QuarantinedPartOut,
+        [require(_verb.role)],
     )

@@ -111,13 +111,12 @@ def quarantine_page(
     message = said(verbs.PART, done, n) if done and n else None
     if done == "set-aside":
         message = _("The parts are set aside. Mark them at the machine: print this page.")
-    offered = [verb for verb in verbs.PART if verb.name != "release" or caller.may("engineer")]
     return page(
         request,
         "quarantine/quarantine.html",
         row=row,
         rows=queries.parts(session, row.quarantine),
-        offered=offered if caller.may("operator") else [],
+        offered=[verb for verb in verbs.PART if verb.permits(caller)],
         done=message,
         late=queries.part(session, row.quarantine, late).part if late else None,
         wording=alarm_words,

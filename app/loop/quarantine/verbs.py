@@ -39,7 +39,6 @@ class OfPart:
 
 def release_part(on: OfPart, given: ReasonIn) -> PartRow:
     """Release a part by the word of an engineer, with the reason. An operator releases it by measuring it again."""
-    on.caller.must("engineer")
     return actions.decide(on.session, on.quarantine, on.number, "released", given.reason, on.caller)
 
 
@@ -87,6 +86,7 @@ PART: tuple[Verb[OfPart, Any], ...] = (
         when=("open",),
         body=ReasonIn,
         act=release_part,
+        role="engineer",
         own=_decided_so("released"),
         word=lambda: _("Release"),
         title=lambda _on: _("Release {part}?"),
@@ -96,7 +96,6 @@ PART: tuple[Verb[OfPart, Any], ...] = (
             _("Concession by the customer"),
             _("Measured elsewhere"),
         ],
-        fits=lambda on: on.caller.may("engineer"),
         said=lambda: _("Part {n} is released."),
     ),
     Verb(

@@ -4,7 +4,7 @@ from typing import Annotated
 
 from fastapi import Path, Query, Response
 
-from app.access.deps import AnyCaller, Operator, OperatorOrMachine
+from app.access.deps import AnyCaller, Operator, OperatorOrMachine, require
 from app.core.parameters import MOST_LOCATIONS
 from app.core.plausibility import offset_warnings
 from app.loop.machines.queries import hold_machine, machine_for, machine_named
@@ -224,7 +224,7 @@ def _of_machine(session: DoorSessionDep, caller: AnyCaller, machine: MachineKey,
     return OfCorrection(session, machine_for(session, caller, machine, "operator"), number, caller)
 
 
-def _of_person(session: SessionDep, caller: Operator, machine: MachineKey, number: Number) -> OfCorrection:
+def _of_person(session: SessionDep, caller: AnyCaller, machine: MachineKey, number: Number) -> OfCorrection:
     return OfCorrection(session, machine_named(session, machine), number, caller)
 
 
@@ -233,8 +233,8 @@ def _decided(on: OfCorrection, done: Decided) -> CorrectionOut:
 
 
 for _verb in CORRECTION:
-    _subject = _of_machine if _verb.by_machine else _of_person
-    draw(router, f"/corrections/{{machine}}/{{number}}/{_verb.name}", _verb, _subject, _decided, CorrectionOut)
+    _subject, _asks = (_of_machine, []) if _verb.by_machine else (_of_person, [require(_verb.role)])
+    draw(router, f"/corrections/{{machine}}/{{number}}/{_verb.name}", _verb, _subject, _decided, CorrectionOut, _asks)
 
 
 @router.post("/corrections/{machine}/approve", responses=problems(404, 409))

@@ -110,7 +110,8 @@ def _correction(
 ) -> Response:
     on = OfCorrection(session, machine_named(session, machine), number, caller)
     row = on.row
-    chosen = next((verb for verb in verbs.offered(row.correction.status) if verb.name == name), None)
+    offered = [verb for verb in verbs.offered(row.correction.status) if verb.permits(caller)]
+    chosen = next((verb for verb in offered if verb.name == name), None)
     origin = {"from": came_from} if came_from else {}
     return page(
         request,
@@ -119,9 +120,7 @@ def _correction(
         machine=on.machine,
         row=row,
         back=LISTS.get(came_from or "") or memory_address(machine, tool=row.correction.tool_memory),
-        question=chosen.question(on, f"/machines/{machine}/corrections/{number}", **origin)
-        if chosen and caller.may("operator")
-        else None,
+        question=chosen.question(on, f"/machines/{machine}/corrections/{number}", **origin) if chosen else None,
         form=form or {},
         wording=wording,
         address=memory_address,

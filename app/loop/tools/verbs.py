@@ -226,7 +226,7 @@ CORRECTION: tuple[Verb[OfCorrection, Any], ...] = (
 
 
 def offered(status: str) -> list[Verb[OfCorrection, Any]]:
-    """Acts that a correction of this status permits to a person, the likeliest first."""
+    """Acts that a correction of this status permits to a person of their role, the likeliest first."""
     return [verb for verb in CORRECTION if status in verb.when]
 
 

@@ -100,6 +100,7 @@ START: Verb[OfTrial, StartIn] = Verb(
     name="start",
     body=StartIn,
     act=start_correcting,
+    role="engineer",
     own=lambda on: on.current.version.created_by == on.caller.name and not on.current.parameters.measures_only,
     word=lambda: _("Switch to automatic"),
     title=lambda _on: _("Let {name} correct tool {tool}?"),
