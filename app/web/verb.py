@@ -22,7 +22,7 @@ from app.web.templates import page
 
 
 class Actor(Protocol):
-    """Who acts: a person, a key with a person's role, or a machine's own key."""
+    """A person, a key with a person's role, or a machine's own key."""
 
     @property
     def machine_id(self) -> int | None:
@@ -43,7 +43,7 @@ class Subject(Protocol):
 
     @property
     def caller(self) -> Actor:
-        """Who acts on it."""
+        """The person or key that acts on it."""
         ...
 
     @property

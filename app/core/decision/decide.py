@@ -1,4 +1,4 @@
-"""The decision on one reading: the whole of domain §3, from deviation to tool offset.
+"""The decision on one reading: the whole of domain §3, from deviation to tool offset. Zones: `limits`; arithmetic: `step`.
 
 =================  =============  ==========================================  ====================
 zone               \\|D\\|          correction                                  running average M

@@ -9,6 +9,7 @@ Cpm       (upper - lower) / (6 sqrt(s^2 + (mean - target)^2))           two-side
 Cp and Cpk take the sigma within (what the process could do), Pp, Ppk and Cpm the overall one (what it did). Sources:
 Montgomery, chapter 8; Kotz and Johnson, Process capability indices (1993); ISO 22514-2 for the percentile method;
 R. H. Kushler and P. Hurley, Confidence bounds for capability indices, J. Qual. Technol. 24 (1992) for the intervals.
+Readings far from all others are named by `outliers`; what an index is quoted by, `quoting` decides.
 """
 
 from dataclasses import dataclass

@@ -12,9 +12,9 @@ from numpy.typing import ArrayLike, NDArray
 
 from app.core.spc.capability import Index, Limits, capability
 from app.core.spc.fitting import Fitted
+from app.core.spc.outliers import far_off
 from app.core.spc.quoting import fit_if_needed
 from app.core.spc.refusal import Reason, Refused, checked
-from app.core.spc.spread import far_off
 
 RUN = 50
 """Parts of a run at least (ISO 22514-3, where 100 are better)."""

@@ -27,8 +27,8 @@ from app.core.spc.capability import (
 )
 from app.core.spc.fitting import Fitted, fitted
 from app.core.spc.in_time import InTime
+from app.core.spc.outliers import far_off
 from app.core.spc.refusal import Floats, Refused
-from app.core.spc.spread import far_off
 from app.core.spc.stability import Stability
 
 Result = TypeVar("Result")

@@ -27,8 +27,8 @@ from app.charts import (
 )
 from app.core.spc.capability import CAPABLE, VERY_CAPABLE, Limits
 from app.core.spc.fitting import Fitted, density
+from app.core.spc.outliers import far_off
 from app.core.spc.refusal import Floats
-from app.core.spc.spread import far_off
 from app.language.i18n import _, ngettext
 from app.language.numbers import signed
 from app.language.times import plant_zone

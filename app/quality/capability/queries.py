@@ -33,9 +33,9 @@ from app.core.spc.capability import (
 from app.core.spc.fitting import Fitted
 from app.core.spc.in_time import InTime
 from app.core.spc.normality import MOST_FOR_SHAPIRO, Normality
+from app.core.spc.outliers import far_off
 from app.core.spc.quoting import Quoting, fit_if_needed, or_refused, quoting, stable
 from app.core.spc.refusal import Floats, Refused
-from app.core.spc.spread import far_off
 from app.core.spc.stability import Stability
 from app.core.spc.tolerance_interval import ToleranceInterval, tolerance_interval
 from app.core.spc.uncompensated import Uncompensated

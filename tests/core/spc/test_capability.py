@@ -13,8 +13,9 @@ from scipy.stats import anderson, nct, norm
 
 from app.core.spc.capability import Capability, Caution, Limits, capability, expected_ppm, observed_ppm, percentile
 from app.core.spc.normality import anderson_darling, shapiro_wilk
+from app.core.spc.outliers import far_off
 from app.core.spc.refusal import Reason, Refused
-from app.core.spc.spread import far_off, pooled, subgroups
+from app.core.spc.spread import pooled, subgroups
 from tests.chance import examples
 
 READINGS = st.lists(st.integers(-300, 300), min_size=20, max_size=80).filter(

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from app.core.spc import shewhart, spread
+from app.core.spc import outliers, shewhart
 from app.core.spc.in_time import brown_forsythe, in_time
 from app.core.spc.normality import anderson_darling, shapiro_wilk
 from app.core.spc.quantity import Quantity, Series, individuals_of
@@ -75,5 +75,5 @@ def test_no_verdict_is_made_of_rounding_noise() -> None:
             refuses()
         assert refused.value.reason is Reason.NO_VARIATION
     assert summary(noise).autocorrelation is None
-    assert not spread.far_off(noise).any()
+    assert not outliers.far_off(noise).any()
     assert np.isnan(brown_forsythe([noise[:30], noise[30:]]).p_value)
