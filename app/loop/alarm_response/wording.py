@@ -98,7 +98,7 @@ def consequences(row: AlarmRow, action: str) -> list[str]:
         case "sister_tool":
             sentences += [
                 _(
-                    "What corrected tool {tool} corrects tool {sister} from now on: a new version of the parameters."
+                    "From now on the characteristics of tool {tool} correct tool {sister}; each gets a new version of its parameters."
                 ).format(tool=alarm.tool_memory, sister=row.sister),
                 _("Corrections computed for tool {tool} are dropped; the running averages begin at 0.").format(
                     tool=alarm.tool_memory

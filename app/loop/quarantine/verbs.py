@@ -77,7 +77,7 @@ PART: tuple[Verb[OfPart, Any], ...] = (
         title=lambda _on: _("{part} was measured again?"),
         follows=lambda _on: [_("In tolerance it is released, outside it is scrapped. Size and reason stay on record.")],
         size=lambda _on: Size("measured", _("Size found"), "", needed=True),
-        reasons=lambda: [_("Micrometer"), _("Measuring machine"), _("Plug gauge"), _("On the machine again")],
+        reasons=lambda: [_("Micrometer"), _("CMM"), _("Plug gauge"), _("On the machine again")],
         fits=lambda on: on.row.part.part_to is None,
         said=lambda: _("Part {n} was measured again; it is decided."),
     ),
@@ -92,7 +92,7 @@ PART: tuple[Verb[OfPart, Any], ...] = (
         title=lambda _on: _("Release {part}?"),
         follows=lambda _on: [_("It counts as good without another measurement. The reason stays on record.")],
         reasons=lambda: [
-            _("Tried with its counterpart, fits"),
+            _("Fits its mating part"),
             _("Concession by the customer"),
             _("Measured elsewhere"),
         ],

@@ -173,7 +173,7 @@ CORRECTION: tuple[Verb[OfCorrection, Any], ...] = (
         title=lambda _on: _("Release correction {number}?"),
         follows=lambda on: [
             _to_machine(on),
-            _("Its alarm stays until it is acknowledged; better decide there."),
+            _("Its alarm stays active until it is acknowledged; it is better to decide there."),
         ],
         reasons=lambda: [_("Edge looked at, still good"), _("Until the end of the batch"), _("Replaced at next stop")],
         said=lambda: _("Correction {n} is released; it waits for the machine."),
@@ -275,7 +275,7 @@ def _cut(on: OfTool) -> str:
 def _switching(on: OfTool) -> list[str]:
     values = {**on.values, "characteristics": ", ".join(on.row.characteristics)}
     return [
-        _("{characteristics} correct tool {sister} from now on: a new version of the parameters of each.").format(
+        _("From now on {characteristics} correct tool {sister}; each gets a new version of its parameters.").format(
             **values
         ),
         *_falling(on),
@@ -294,7 +294,7 @@ CHANGE: Verb[OfTool, ToolChange] = Verb(
     word=lambda: _("Tool changed"),
     title=lambda _on: _("Was tool {tool} changed?"),
     follows=lambda on: [_cut(on), *_falling(on)],
-    reasons=lambda: [_("Insert turned"), _("New insert"), _("New tool"), _("Insert chipped")],
+    reasons=lambda: [_("Insert indexed"), _("New insert"), _("New tool"), _("Insert chipped")],
     size=_offset_of(lambda: _("Offset of the new tool"), lambda _on: "0.0000"),
     said=lambda: _("Tool {n} starts a new life."),
 )
@@ -306,7 +306,7 @@ TOOL: tuple[Verb[OfTool, Any], ...] = (
         act=_edit,
         word=lambda: _("Set the offset"),
         title=lambda _on: _("Set the offset of tool {tool} by hand"),
-        follows=lambda on: [_("Known until now: {offset}.").format(**on.values), *_falling(on)],
+        follows=lambda on: [_("Offset on record: {offset}.").format(**on.values), *_falling(on)],
         reasons=lambda: [_("Set at the control"), _("Part measured by hand"), _("Typing error corrected")],
         size=_offset_of(lambda: _("Offset"), lambda on: typed_length(on.row.tool.offset)),
         said=lambda: _("The offset of tool {n} is set."),
@@ -320,7 +320,7 @@ TOOL: tuple[Verb[OfTool, Any], ...] = (
         title=lambda _on: _("Switch from tool {tool} to its sister {sister}?"),
         follows=_switching,
         reasons=lambda: [_("Edge worn"), _("Insert chipped"), _("Planned life reached")],
-        said=lambda: _("Tool {n} goes on as the sister tool. Select it at the machine."),
+        said=lambda: _("Tool {n} takes over as the sister tool. Select it at the machine."),
     ),
 )
 
@@ -386,8 +386,8 @@ def done(code: str, number: int) -> str | None:
             "The empirical value of R11 = {n} is set to more than 1 mm: no probe measures so far off. Is it µm?"
         ),
         "average-step": _(
-            "The empirical value of R11 = {n} is set, more than a tolerance from the one before: the next reading asks for that. Is it "
-            "µm?"
+            "The empirical value of R11 = {n} is set. It differs from the previous one by more than the whole tolerance, and the next "
+            "correction will include the difference. Was it entered in µm?"
         ),
     }
     return said((*CORRECTION, *TOOL), code, number, more)
