@@ -325,7 +325,7 @@ def test_who_may_not_hears_that_before_what_is_wrong(server: InProcess, size: in
 def test_the_key_of_a_machine_hears_all_that_it_may_do(shop: Shop) -> None:
     refused = shop.machine_client.post("/api/v1/machines", json={})
     assert refused.status_code == 403
-    assert "its corrections, tools, averages, calibrations and pairs" in refused.json()["detail"]
+    assert "send what the machine itself measures, applies and reports" in refused.json()["detail"]
 
 
 VIEWERS_MAY = {

@@ -37,6 +37,7 @@ OPENED_ELSEWHERE = {"/import/{token}"}  # needs a file that was sent; tests/loop
 PARTS = {  # only ever fetched into a page
     "/plant-summary",
     "/todo/count",
+    "/todo/not-reached",
     "/wall/now",
     "/setup/fit",
     "/setup/natural",

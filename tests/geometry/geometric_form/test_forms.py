@@ -193,7 +193,7 @@ class TestReadings:
         post(shop, **(PLATE | {"points": warped}), characteristic=flat)
         assert shop.call("GET", f"/readings/{flat}/2")["measured"] == pytest.approx(0.005)
         assert len(shop.alarms()) > before
-        assert shop.call("GET", f"/readings/{flat}/2")["zone"] == "out_of_tolerance"
+        assert shop.call("GET", f"/readings/{flat}/2")["zone"] == "oversize"
         assert shop.call("GET", f"/characteristics/{flat}")["parameters"]["natural_limit"] == "lower"
 
     def test_only_of_a_characteristic_of_this_machine(self, server: Server, common_shop: Shop) -> None:
