@@ -32,7 +32,7 @@ class TestTool:
         shop.call("PATCH", f"/machines/{shop.machine}/tools/3", sister=13)
         path = f"/machines/{shop.machine}/tools/3/sister"
         assert "Select tool 13 at the machine" in operator.open(path)
-        assert "Tool 13 goes on" in operator.send(path, reason="Edge worn")
+        assert "Tool 13 takes over" in operator.send(path, reason="Edge worn")
         assert shop.tool(13)["characteristics"] == [shop.characteristic]
         operator.open(path, 404)  # nothing is left to be switched
 
