@@ -41,7 +41,7 @@ def ask_of_time(session: Session, machine: Machine, correction: Correction, appl
 
 
 def _answered(session: Session, machine: Machine) -> list[float]:
-    """By how much the clock was behind in alarms that somebody has answered, s."""
+    """By how much the clock was behind in alarms that have been answered, s."""
     rows = session.scalars(
         select(Alarm.data["lag"].as_float()).where(
             Alarm.machine_id == machine.id,

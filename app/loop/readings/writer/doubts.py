@@ -77,7 +77,7 @@ def follow_statuses(pending: PendingWrites, tool: PendingTool) -> None:
 
 
 class Answered(NamedTuple):
-    """A doubt that somebody has answered. lag: of the clock that it was about, s; None if of none."""
+    """A doubt that has been answered. lag: by how much the clock was behind, s; None where it was not about a clock."""
 
     machine_id: int
     tool_memory: int
