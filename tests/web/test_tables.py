@@ -58,17 +58,25 @@ def test_cards_of_a_phone_name_their_columns_and_sort_where_they_are_seen(
     page.set_viewport_size({"width": 390, "height": 844})
     page.goto("/setup/machines")
     rows = page.locator("#machines tbody tr")
-    page.get_by_label("Sort by").first.select_option("Name ▾")
+    sort_by = page.get_by_label("Sort by").first
+    chosen = "choice => choice.selectedOptions[0].text"
+    assert sort_by.evaluate(chosen) == "as listed"
+    sort_by.select_option("Name ▾")
     expect(rows.first).to_contain_text("Mill 10")
-    page.get_by_label("Sort by").first.select_option("Name ▴")
+    sort_by.select_option("Name ▴")
     expect(rows.last).to_contain_text("Mill 10")
     page.get_by_label("Show rows with").focus()
     page.keyboard.press("Tab")
     assert page.evaluate("document.activeElement.closest('tbody') !== null"), "no head that nobody sees is between"
     page.goto("/setup/characteristics?q=ring")
-    page.locator("summary", has_text="Sort by").click()
+    page.locator("summary", has_text="Sort by as listed").click()
     page.locator(".sort-by").get_by_role("link", name="Characteristic").click()
     expect(page.locator(".sort-by [aria-current]")).to_have_count(1)
+    expect(page.locator(".sort-by summary")).to_have_text("Sort by Characteristic ▴")
+    for target in (20.001, 20.002):
+        hall.call("PATCH", "/characteristics/disc_c", parameters={"target": target}, reason="Moved")
+    page.goto("/setup/characteristics/disc_c")
+    assert page.locator("#all-versions-sort").evaluate(chosen) == "Version ▾", "an order of a column has its name"
 
 
 def test_the_server_filters_by_name_where_a_list_has_pages(hall: Shop, viewer: Person) -> None:

@@ -5,6 +5,7 @@
 //   td[data-value]    what is sorted by in place of the text
 //
 //   data-sort="…"     the label of the choice that sorts it where its rows are cards and have no heads (components.css)
+//   data-listed="…"   what that choice shows while the rows are in the order of no column
 //
 // Numbers sort as numbers (−12.5, 1,234.5 µm), times of <time-ago> by their moment, words as people sort them, a choice by what is
 // chosen. A second click turns the order. Without script the table is as the server made it. A live part that is fetched again keeps order and filter.
@@ -60,17 +61,29 @@ function filter(table, text) {
   }
 }
 
+function found(table) {
+  const rows = [...table.tBodies[0].rows];
+  for (const [column, head] of [...table.tHead.rows[0].cells].entries()) {
+    const values = rows.map((row) => valueOf(row.cells[column]));
+    const steps = values.slice(1).map((value, at) => compare(values[at], value));
+    if (!head.dataset.words || steps.filter((step) => step === 0).length > steps.length / 2) continue; // a few words that chance put in order
+    if (steps.every((step) => step <= 0)) return { column };
+    if (steps.every((step) => step >= 0) && values.every(Boolean)) return { column, descending: true };
+  }
+  return {};
+}
+
 function sortBy(table) {
   const label = document.createElement("label");
   label.className = "sort-by";
   const select = document.createElement("select");
   select.id = `${nameOf(table)}-sort`;
-  select.append(new Option("–", ""));
+  const { column, descending } = kept.get(nameOf(table))?.column === undefined ? found(table) : kept.get(nameOf(table));
+  if (column === undefined) select.append(new Option(table.dataset.listed, ""));
   for (const [column, head] of [...table.tHead.rows[0].cells].entries())
     if (head.dataset.words)
       for (const way of ["ascending", "descending"])
         select.append(new Option(`${head.dataset.words} ${way === "ascending" ? "▴" : "▾"}`, `${column} ${way}`));
-  const { column, descending } = kept.get(nameOf(table)) ?? {};
   if (column !== undefined) select.value = `${column} ${descending ? "descending" : "ascending"}`;
   select.addEventListener("change", () => {
     if (!select.value) return;
