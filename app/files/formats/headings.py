@@ -1,21 +1,24 @@
 """Headings of tables: below titles, in lines of their own, with cells that are merged across and downwards."""
 
 import re
-from collections.abc import Iterator, Sequence
-from itertools import accumulate
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
+from itertools import accumulate, chain
 from typing import NamedTuple
 
+from app.core.number_text import number_or_none
 from app.files.formats import delimited
 from app.files.formats.cell_values import folded
-from app.files.formats.column_names import SUMMARIES
+from app.files.formats.column_names import NAMES, SUMMARIES, key_of
 from app.files.formats.delimited import Row
-from app.files.formats.units import OTHER_UNITS, is_unit_column, length_unit
+from app.files.formats.units import OTHER_UNITS, is_unit_column, length_unit, unit_behind
 
 TOP = 500  # rows in which the heading is looked for
 FIRST = 50  # of them, in which another may stand than the one that is found
 _WITH_VALUE = re.compile(r"([^:=]{1,40}?) ?= ?\S.{0,40}|([^:=]{2,40}?) ?: ?\S.{0,40}")
 """A label and its value in one cell; a single letter before a colon may be the number of a part."""
 TABLE = 2  # rows of values that make a table
+FAR = 4  # times as large or as small is another kind of number
+_WORDS = frozenset(key_of(word) for words in NAMES.values() for word in words)
 
 
 class Heading(NamedTuple):
@@ -79,6 +82,85 @@ def others(top: Sequence[Row], found: Heading, *, named: bool = False) -> Iterat
             beside = zip(found.names, row.cells, strict=False)
             measured += not named and sum(bool(name) and delimited.is_value(cell) for name, cell in beside) > 1
         yield row
+
+
+def is_reading(
+    found: Heading, top: Sequence[Row], sizes: Collection[int] = (), times: Collection[int] = ()
+) -> bool | None:
+    """Tell that the line which was found as the heading is a reading, so that the table has none; None where it may be either.
+
+    sizes, times: places of the columns that hold them, where somebody has said so.
+
+    >>> def first(*lines):
+    ...     rows = [Row(at, line.split(";")) for at, line in enumerate(lines, 1)]
+    ...     return is_reading(heading(rows), rows)
+    >>> first("40", "41", "40"), first("7;40", "8;41"), first("7;40;6:05", "8;40,1;6:06"), first("40", "40,01")
+    (True, True, True, None)
+    >>> first("1;2", "40,01;40,02"), first(";1;2", "D40;3;4"), first("1;2", "2;1"), first("P1;40", "P2;41"), first("Part;1", "A;2")
+    (False, False, None, None, False)
+    """
+    names = {place: name for place, name in enumerate(found.names) if name.strip()}
+    clear = {place for place, name in names.items() if _is_measured(name)}
+    whole = {place: abs(number) for place, name in names.items() if (number := _whole(name)) is not None}
+    if not clear and not whole:
+        return False
+    below = [row.cells for row in top if row.line > max(found.line, found.end)]
+    columns = {
+        place: [cells[place] for cells in below if place < len(cells) and cells[place].strip()] for place in names
+    }
+    counted = [*whole.values()] == [*range(1, len(whole) + 1)] and not clear
+    if any(place in clear and number_or_none(names[place]) is None for place in times):
+        return True
+    if words := names.keys() - clear - whole.keys():
+        return _beside_words(names, words, columns, clear, sizes, counted=counted and len(whole) > 1)
+    gaps = set(range(len(found.names))) - names.keys()
+    if any(place < len(cells) and cells[place].strip() for cells in below for place in gaps):
+        return False if counted else True if any(":" in names[place] for place in clear) else None
+    if clear:
+        return True
+    other = any(_is_far(number, columns[place]) for place, number in whole.items())
+    if counted:
+        return False if other else None
+    return True if not other and all(_whole(cell) is not None for cell in chain(*columns.values())) else None
+
+
+def _beside_words(
+    names: Mapping[int, str],
+    words: Collection[int],
+    columns: Mapping[int, Sequence[str]],
+    clear: Collection[int],
+    sizes: Collection[int],
+    *,
+    counted: bool,
+) -> bool | None:
+    """The same of a line with words beside its numbers. words: their places. clear: those of sizes with decimals, and of times."""
+    known = any(key_of(names[place]) in _WORDS for place in words)
+    if any(place in clear for place in sizes):
+        return None if known else True
+    above = any(columns[place] and all(map(delimited.is_value, columns[place])) for place in words)
+    if known or above or any(place in words for place in sizes):
+        return False
+    beside = (cell for place, cells in columns.items() if place not in words for cell in cells)
+    return False if counted and any(_whole(cell) is None for cell in beside) else None
+
+
+def _is_measured(cell: str) -> bool:
+    """Tell of a size with decimals or with its unit, a date, or a time."""
+    text, unit = unit_behind(cell)
+    if number_or_none(text) is None:
+        return delimited.is_value(cell)
+    return bool(unit) or not text.strip().lstrip("+-").isdigit()
+
+
+def _whole(cell: str) -> int | None:
+    text = cell.strip()
+    return int(text) if re.fullmatch(r"[+-]?\d{1,15}", text, re.ASCII) else None
+
+
+def _is_far(number: int, cells: Iterable[str]) -> bool:
+    """Tell of a number that is of another kind than those below it, such as 1 above 40,001."""
+    sizes = [abs(size) for cell in cells if (size := number_or_none(unit_behind(cell)[0])) is not None]
+    return bool(sizes) and (FAR * (number + 1) < min(sizes) or number > FAR * (max(sizes) + 1))
 
 
 def is_summary(label: object) -> bool:

@@ -76,6 +76,20 @@ def columns_of(header: tuple[str, ...], mapping: Mapping[str, str]) -> dict[str,
     return {name: places for name, places in columns.items() if name not in DRAWN}
 
 
+def by_places(header: tuple[str, ...], cells: Sequence[str], mapping: Mapping[str, str]) -> dict[str, tuple[int, ...]]:
+    """The places of each field in a table without a heading: as numbers of columns, else by its first cells. Raises `Invalid`."""
+    first = {cell: header[at] for at, cell in reversed([*enumerate(cells)])}
+
+    def named(column: str) -> str:
+        if not column or _place(header, column) is not None:
+            return column
+        if column in first or "+" not in column:
+            return first.get(column, column)
+        return "+".join(named(part.strip()) for part in column.split("+"))
+
+    return columns_of(header, {name: named(column) for name, column in mapping.items()})
+
+
 def fits(names: Sequence[str], mapping: Mapping[str, str]) -> bool:
     """Tell of names that have the columns which a person names, and one that is measured."""
     columns = [column for column in mapping.values() if column and not column.isdigit()]

@@ -9,16 +9,15 @@ from pathlib import Path
 from typing import Any, NamedTuple
 from zoneinfo import ZoneInfo
 
-from app.core.number_text import number_or_none
 from app.errors import FieldError, Invalid
 from app.files.formats import cell_values, delimited, parts_across, spreadsheet
 from app.files.formats.cell_values import slashed
 from app.files.formats.delimited import Row, Unusable
 from app.files.formats.file_times import FileTimes, times_of
-from app.files.formats.headings import TOP, as_wide, heading, is_summary, others
+from app.files.formats.headings import TOP, as_wide, heading, is_reading, is_summary, others
 from app.files.formats.units import LENGTHS, UnknownUnit, length_unit, unit_above, unit_behind, unit_in
 from app.language.i18n import _
-from app.loop.readings.importing.columns import DRAWN, columns_of, fits, guesses_of, nominal_of
+from app.loop.readings.importing.columns import DRAWN, by_places, columns_of, fits, guesses_of, nominal_of
 
 MOST_COLUMNS = 500
 LONGEST_NAME = 1_000
@@ -74,6 +73,7 @@ class Layout:
         str | None, ...
     ] = ()  # of columns whose header says none: in a row below it, or in the lines above the table
     doubt: str = ""  # a unit that the lines above the table name, and do not say of what
+    question: tuple[str, str] | None = None  # what only a person can answer: the choice, and the sentence
     thousands: Mapping[int, str] = field(default_factory=dict)  # a number whose sign may part thousands, by its column
     nominal: tuple[int, ...] = ()  # of the nominal size, which is one for all rows of a characteristic
     zone: ZoneInfo | None = None
@@ -132,6 +132,11 @@ class Layout:
         if place in self.thousands and LENGTHS[unit or "mm"] < 1:
             sheet = self.kind == "sheet"
             raise wrong("decimal", delimited.thousands_in_doubt(self.thousands[place], unit or "mm", sheet=sheet))
+
+    def refuse_question(self) -> None:
+        """Refuse what only a person can answer, before anything is stored. Raises `Invalid`."""
+        if self.question:
+            raise wrong(*self.question)
 
     def of_one(self, key: str, name: str) -> "Layout":
         """The layout for one characteristic: of a table with rows of several, its own rows. Raises `Invalid`."""
@@ -203,8 +208,10 @@ def look(path: Path, wishes: Wishes, name: str | None = None, *, complete: bool 
 
 
 def refuse_incomplete(layout: Layout) -> None:
-    """Refuse a file in which no column is known to hold what was measured. Raises `Invalid`."""
-    if not layout.complete:
+    """Refuse a file in which no column is known to hold what was measured, or that leaves a question. Raises `Invalid`."""
+    if layout.complete:
+        layout.refuse_question()
+    else:
         raise wrong(
             "measured",
             layout.turned
@@ -273,10 +280,15 @@ def _csv_layout(path: Path, wishes: Wishes, zone: ZoneInfo | None, kind: str = "
     _refuse_wide(header)
     first_line = max(head + 1, end + 1, wishes.first_line or 0)
     columns = columns_of(header, wishes.mapping)
-    if "measured" in columns and wishes.header_line is None and _is_size(header[columns["measured"][0]]):
-        # There is no heading: a person has said the columns by their places, and this line is a reading.
-        first_line, head = max(head, wishes.first_line or 0), 0
-        header = tuple(_("Column {n}").format(n=at) for at in range(1, len(header) + 1))
+    bare: bool | None = False
+    if wishes.header_line is None:
+        bare = is_reading(found, top, columns.get("measured", ()), columns.get("measured_at", ()))
+        if bare is None and wishes.first_line is not None:  # somebody has said what it is
+            bare = wishes.first_line <= head
+    if bare:  # there is no heading: this line is a reading
+        numbered = tuple(_("Column {n}").format(n=at) for at in range(1, len(header) + 1))
+        header, columns = numbered, by_places(numbered, header, wishes.mapping)
+        first_line, head, units = max(head, wishes.first_line or 0), 0, ()
     place = columns.get("measured", (0,))[0]
     # Where no column is the measured one, it may be any of them, or several.
     only = slice(place, place + 1) if "measured" in columns else slice(None)
@@ -295,6 +307,7 @@ def _csv_layout(path: Path, wishes: Wishes, zone: ZoneInfo | None, kind: str = "
         said_unit=(unit_of(header[place], wishes.unit) or units[place]) if "measured" in columns else wishes.unit,
         units=units,
         doubt="" if wishes.unit or "unit" in columns else doubt,
+        question=_heading_or_reading(head, header) if bare is None else None,
         thousands={} if wishes.decimal and kind == "csv" else _thousands(below, range(len(header))[only], kind),
         nominal=nominal_of(header, columns, wishes.mapping),
         zone=zone,
@@ -316,14 +329,12 @@ def _csv_layout(path: Path, wishes: Wishes, zone: ZoneInfo | None, kind: str = "
     return replace(_timed(made, _times(made, below, rows)), drawn=_drawn(made, named))
 
 
-def _is_size(name: str) -> bool:
-    """Tell of what stands in place of a name and is a size: a number with decimals.
-
-    >>> _is_size("40,001"), _is_size("40.001 mm"), _is_size("40"), _is_size("D40.5")
-    (True, True, False, False)
-    """
-    text = unit_behind(name)[0]
-    return not text.isdigit() and number_or_none(text) is not None
+def _heading_or_reading(line: int, names: Sequence[str]) -> tuple[str, str]:
+    words = _(
+        "Line {n} ({cells}) may name the columns, or be a reading. Say which it is: the line of the column names (--header-line {n}), or "
+        "the first line of readings (--first-line {n})."
+    )
+    return "header_line", words.format(n=line, cells="; ".join(names)[:80])
 
 
 def _letters(rows: Iterable[Row]) -> str:

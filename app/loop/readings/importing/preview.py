@@ -40,6 +40,10 @@ def preview(database: Database, characteristic: str, path: Path, looked: Looked)
     layout = looked.layout
     if not layout.complete:
         return Preview(first_lines(looked), None, [], 0, None, None)
+    try:
+        layout.refuse_question()
+    except InbandError as question:
+        return Preview(first_lines(looked), None, [], 0, question, None)
     checked = CHECKED_LINES if path.stat().st_size > TRIED_WHOLE else None
     with read_apart(path, [layout], checked) as read:
         shown = _shown(looked.first, read(0, characteristic))

@@ -97,6 +97,7 @@ def import_wide(
     are set up whose characteristic is `NEW`.
     """
     _refuse_twice(columns)
+    layout.refuse_question()
     if read is None and layout.names:  # once for all names, of which a file may have a thousand
         how: dict[str, Any] = {"actor": actor, "source": source, "dry_run": dry_run, "progress": progress}
         with read_here(path, [_layout_of(layout, column, unit) for column in columns]) as held:
@@ -141,6 +142,7 @@ def import_apart(
 ) -> list[ColumnResult]:
     """The same with a file of somebody else, which is read once, in a process of its own."""
     _refuse_twice(columns)
+    layout.refuse_question()
     with read_apart(path, [_layout_of(layout, column, unit) for column in columns]) as read:
         how: dict[str, Any] = {"actor": actor, "source": source, "dry_run": dry_run, "machine": machine}
         return import_wide(database, columns, path, layout, unit=unit, read=read, **how)
