@@ -11,7 +11,7 @@ from app.core.policy_map import Criterion, room, value_of
 from app.core.replay import Figures
 from app.core.spc.refusal import Reason, Refused
 from app.language.i18n import _, ngettext
-from app.language.numbers import NO_BREAK_SPACE, NOTHING, percent, plain_um, short, signed, um
+from app.language.numbers import NO_BREAK_SPACE, NOTHING, fixed, percent, plain_um, short, signed, um
 from app.loop.characteristics.wording import label
 from app.quality.capability import wording as capability
 from app.quality.capability.wording import named
@@ -70,11 +70,11 @@ def moment(text: str) -> datetime:
 def effect(effect_size: Effect) -> str:
     """Effect of corrections on this machine."""
     sentence = _(
-        "On this machine a correction of 10 µm moves the part by {value} µm ({low}…{high}), by {count} corrections."
+        "On this machine a correction of 10 µm moves the part by {value} µm (95 % interval {low} to {high} µm), by {count} corrections."
     ).format(
-        value=f"{10 * effect_size.value:.1f}",
-        low=f"{10 * effect_size.low:.1f}",
-        high=f"{10 * effect_size.high:.1f}",
+        value=fixed(10 * effect_size.value, 1),
+        low=fixed(10 * effect_size.low, 1),
+        high=fixed(10 * effect_size.high, 1),
         count=effect_size.corrections,
     )
     if effect_size.is_full:

@@ -104,7 +104,10 @@ def _section(frame: Frame, name: SectionName) -> Section | None:
 def _period(frame: Frame) -> str:
     """The period and the context in words, as they are on every page."""
     request, ends, zone = frame.request, frame.ends, ZoneInfo(frame.request.zone)
-    period = " – ".join(moment(at).words(zone) if at is not None else "…" for at in request.period)
+    period = " – ".join(
+        moment(at).words(zone) if at is not None else unbounded
+        for at, unbounded in zip(request.period, (_("the first"), _("now")), strict=True)
+    )
     period = ", ".join(filter(None, (context_words(request.context), period if request.period.bounded else "")))
     if ends is None:
         return _("{period}, no readings").format(period=period) if period else _("no readings")
