@@ -296,6 +296,27 @@ def regressed(
     return xx, xd, moved
 
 
+def gain_of(
+    deviation: Floats, compensated: Floats, factor: float, begin: int, expected: float
+) -> tuple[float, float] | None:
+    """The gain of all corrections among the newest `RECENT` parts, without a trend, and its standard error.
+
+    None where they do not show it: too few or too small corrections, or the size moved by itself. begin, expected: as in `opposed`.
+
+    >>> d, s = np.array([0.010, -0.0098, 0.0102, -0.01]), np.array([0.0, -0.01, -0.0002, -0.0104])
+    >>> gain, error = gain_of(d, s, -1.0, 0, 0.0005)
+    >>> round(gain, 2), error < 0.1, gain_of(d, np.zeros(4), -1.0, 0, 0.0005)
+    (1.98, True, None)
+    """
+    count = len(deviation)
+    start = max(begin, count - RECENT)
+    scatter = scatter_of(deviation, compensated, factor, expected, start + 1)
+    xx, xd, moved = regressed(deviation, compensated, factor, (start, count, start), 0.0, scatter)
+    if moved or xx <= 0 or scatter / sqrt(xx) > LARGEST_ERROR:
+        return None
+    return float(xd / xx), float(scatter / sqrt(xx))
+
+
 @compiled
 def judge(
     deviation: Floats, compensated: Floats, factor: float, begin: int, expected: float, averaging_limit: float

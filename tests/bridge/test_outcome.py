@@ -169,6 +169,24 @@ def test_a_machine_that_obeys_cuts_few_parts_with_a_radius_for_a_diameter(server
 
 
 @pytest.mark.long
+@pytest.mark.parametrize("start", [0.003, START])
+def test_two_characteristics_of_a_tool_do_not_hide_a_radius_for_a_diameter(
+    server: Server, tmp_path: Path, start: float
+) -> None:
+    """Each takes back what the other asked for within a part, and neither swings by itself: parts stay out, and that is stopped."""
+    one = play(server, "rest", 60)
+    one.eventful, one.process.amiss, one.process.start, one.process.obeys = False, 2.0, start, True
+    one.set_up(weighting_factor=1)
+    found = one.at_once()
+    assert one.process.parts < 30, "it was stopped"
+    assert max(Counter(number for number, _ in found.out).values()) <= 10
+    assert alarms(one)["still_out"] & {1, 2}
+    [said, *_] = one.call("GET", f"/alarms?state=active&kind=still_out&machine={one.machine}")["items"]
+    assert "5 parts in a row are out of tolerance, although each was corrected for" in said["text"]
+    assert "asks the machine to stop" in said["text"]
+
+
+@pytest.mark.long
 @pytest.mark.parametrize("kind", sorted(KINDS))
 def test_a_wrong_sign_goes_no_further_behind_a_bridge(server: Server, tmp_path: Path, kind: str) -> None:
     """Nor at the sister that goes on, nor at the tool that was changed."""

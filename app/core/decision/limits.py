@@ -160,6 +160,6 @@ def classify(deviation: float, limits: Limits) -> Zone:
     return ZONES[zone_of(deviation, limits)]
 
 
-def within_tolerance(deviation: float, limits: Limits) -> bool:
+def within_tolerance(deviation: float, limits: "Limits | Rules") -> bool:
     """Return whether a part with this deviation (mm) is good: a value on the limit is."""
     return within(nanometres(deviation), limits.tolerance)

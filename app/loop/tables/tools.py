@@ -12,13 +12,16 @@ OUTSTANDING = ("awaiting_approval", "pending")  # issued, not yet in effect
 OPEN = ("held", *OUTSTANDING)
 OPPOSITE = "opposite_effect"  # the alarm of corrections that did the opposite of what they asked
 STRONG = "strong_effect"  # that of corrections that act too strongly and drive parts out of tolerance
+STILL_OUT = "still_out"  # that of parts that stay out of tolerance although each was corrected for
 EARLY = "early_effect"  # that of corrections that act before they are counted
+UNTAKEN = "corrections_not_taken"  # that of corrections that the machine does not take
 DOUBT = "correction_in_doubt"  # that of a reading whose correction_in_effect does not fit
 ASKED_AGAIN = 90  # days after the answer to such a doubt: a clock that was set may be set back in autumn
 OPPOSED = "opposite effect, alarm:"  # why corrections fell, as it is stored; the number of the alarm goes with it
 OVERSHOT = "strong effect, alarm:"
 COUNTED_LATE = "early effect, alarm:"
-FELL = {OPPOSITE: OPPOSED, STRONG: OVERSHOT, EARLY: COUNTED_LATE}
+NO_HELP = "still out, alarm:"
+FELL = {OPPOSITE: OPPOSED, STRONG: OVERSHOT, EARLY: COUNTED_LATE, STILL_OUT: NO_HELP}
 
 
 class Tool(Base):

@@ -7,7 +7,13 @@ from app.language.numbers import as_read, mm, um, um_limit
 from app.loop.alarms.kinds import AlarmKind, register
 from app.loop.alarms.reading_kinds import uncorrected
 from app.loop.tables.alarms import Alarm
-from app.loop.tools.effect_alarm_kinds import EARLY_EFFECT, OPPOSITE_EFFECT, STRONG_EFFECT
+from app.loop.tables.tools import UNTAKEN
+from app.loop.tools.effect_alarm_kinds import (
+    EARLY_EFFECT,
+    OPPOSITE_EFFECT,
+    STILL_OUT_OF_TOLERANCE,
+    STRONG_EFFECT,
+)
 
 
 def _differs(alarm: Alarm) -> str:
@@ -93,10 +99,10 @@ def _not_taken(alarm: Alarm) -> str:
 
 CORRECTIONS_NOT_TAKEN = register(
     AlarmKind(
-        "corrections_not_taken",
+        UNTAKEN,
         concerns_parts=True,
         word=lambda: _("Corrections are not taken"),
-        sentence=_not_taken,
+        sentence=uncorrected(_not_taken),
         what_to_do=lambda: _(
             "With a bridge: does the part program call the program that takes corrections, does the control hold them, has this "
             "tool memory a location in the bridge's configuration and a touch test? Else: does the machine ask for pending "
@@ -111,6 +117,7 @@ PAUSING = (
     OFFSET_DIFFERS.name,
     OPPOSITE_EFFECT.name,
     STRONG_EFFECT.name,
+    STILL_OUT_OF_TOLERANCE.name,
     EARLY_EFFECT.name,
 )  # nothing is corrected through the tool until they are answered
 TOOL_LIFE = register(

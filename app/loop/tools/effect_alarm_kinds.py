@@ -1,4 +1,4 @@
-"""Alarm kinds about what corrections do to the size: the opposite, too much, nothing, or what nobody can count."""
+"""Alarm kinds about what corrections do to the size: the opposite, too much, too little, nothing, or what nobody can count."""
 
 from datetime import datetime
 
@@ -7,7 +7,7 @@ from app.language.numbers import PLUS_MINUS, age, as_read, fixed, signed, um
 from app.loop.alarms.kinds import AlarmKind, register
 from app.loop.alarms.reading_kinds import called, moved_by, uncorrected
 from app.loop.tables.alarms import Alarm
-from app.loop.tables.tools import DOUBT, EARLY, OPPOSITE, STRONG
+from app.loop.tables.tools import DOUBT, EARLY, OPPOSITE, STILL_OUT, STRONG
 
 
 def _opposed(alarm: Alarm) -> str:
@@ -86,6 +86,64 @@ STRONG_EFFECT = register(
                 _("Offset register corrected"),
                 _("Another tool cuts it"),
                 _("Nests or spindles differ"),
+            ]
+        },
+    )
+)
+
+
+def _still_out(alarm: Alarm) -> str:
+    data = alarm.data
+    text = _(
+        "{n} parts in a row are out of tolerance, although each was corrected for: {characteristic} was off by {deviations}.{gain} "
+        "Nothing is corrected through tool {tool} until this alarm is answered."
+    )
+    return text.format(
+        n=data.get("out"),
+        characteristic=called(alarm),
+        deviations=", ".join(map(um, data.get("deviations", ()))),
+        gain=f" {_cause(alarm)}" if "gain" in data else "",
+        tool=alarm.tool_memory,
+    )
+
+
+def _cause(alarm: Alarm) -> str:
+    """What the gain of the corrections is, and what it is likely to come from."""
+    gain = float(alarm.data["gain"])
+    if gain < -0.25:
+        cause = _("wrong sign of the factor?")
+    elif gain < 0.25:
+        cause = _("does the control use this offset?")
+    elif gain < 0.75:
+        cause = _("diameter taken for radius?")
+    elif gain < 1.5:
+        cause = _("look at the tool, the clamping and the probe.")
+    else:
+        cause = _("radius taken for diameter?")
+    return _("The gain of the corrections is {gain} {pm} {error}, it should be 1: {cause}").format(
+        gain=signed(gain, 2), pm=PLUS_MINUS, error=fixed(alarm.data["error"], 2), cause=cause
+    )
+
+
+STILL_OUT_OF_TOLERANCE = register(
+    AlarmKind(
+        STILL_OUT,
+        concerns_parts=True,
+        word=lambda: _("Still out of tolerance"),
+        sentence=uncorrected(_still_out),
+        what_to_do=lambda: _(
+            "Measure a part by hand. Look at the edge, the clamping and the probe. Check the factor of the characteristic (sign, radius or "
+            "diameter) and the offset register at the control, and whether another characteristic of this tool takes its corrections "
+            "back. Then answer the alarm: parts before it no longer count."
+        ),
+        tone="stop",
+        actions=("noted", "tool_replaced", "sister_tool"),
+        comments={
+            "noted": lambda: [
+                _("Factor corrected"),
+                _("Offset register corrected"),
+                _("One characteristic measures only"),
+                _("Clamping corrected"),
             ]
         },
     )

@@ -1,18 +1,27 @@
 """The sentences about corrections and tool offsets: what each status means, and why something cannot be done now."""
 
+from collections.abc import Callable
 from datetime import UTC, datetime
 
 from app.language.i18n import _, ngettext
 from app.language.numbers import NOTHING, PLUS_MINUS, age, fixed, mm, um
 from app.language.times import in_sentence
-from app.loop.tables.tools import COUNTED_LATE, OPPOSED, OVERSHOT, Correction
+from app.loop.tables.tools import COUNTED_LATE, NO_HELP, OPPOSED, OVERSHOT, Correction
 from app.loop.tools.gain_queries import ToolGain
 from app.loop.tools.lives_queries import Life
 from app.loop.tools.queries import OffsetChange
 
-# Why the system itself dropped a correction, as it is stored: the word, and what goes with it.
+# Why the system itself dropped a correction, as it is stored: the word, and what goes with it; in words.
 EXPIRED = "expired after hours:"
 PAUSED = "offset differs, alarm:"
+DROPPED: dict[str, Callable[[], str]] = {
+    EXPIRED: lambda: _("expired: not applied within {} h"),
+    PAUSED: lambda: _("the machine holds another offset than it was computed for (alarm {})"),
+    OPPOSED: lambda: _("corrections before it did the opposite of what they asked (alarm {})"),
+    OVERSHOT: lambda: _("corrections before it acted too strongly (alarm {})"),
+    NO_HELP: lambda: _("corrections before it did not bring parts back into tolerance (alarm {})"),
+    COUNTED_LATE: lambda: _("corrections before it acted earlier than they were counted (alarm {})"),
+}
 
 
 def why(correction: Correction) -> str | None:
@@ -20,21 +29,9 @@ def why(correction: Correction) -> str | None:
     reason = correction.reason
     if reason is None or correction.decided_by is not None:
         return reason
-    if reason.startswith(EXPIRED):
-        hours = reason.removeprefix(EXPIRED).strip()
-        return _("expired: not applied within {hours} h").format(hours=hours)
-    if reason.startswith(PAUSED):
-        alarm = reason.removeprefix(PAUSED).strip()
-        return _("the machine holds another offset than it was computed for (alarm {alarm})").format(alarm=alarm)
-    if reason.startswith(OPPOSED):
-        alarm = reason.removeprefix(OPPOSED).strip()
-        return _("corrections before it did the opposite of what they asked (alarm {alarm})").format(alarm=alarm)
-    if reason.startswith(OVERSHOT):
-        alarm = reason.removeprefix(OVERSHOT).strip()
-        return _("corrections before it acted too strongly (alarm {alarm})").format(alarm=alarm)
-    if reason.startswith(COUNTED_LATE):
-        alarm = reason.removeprefix(COUNTED_LATE).strip()
-        return _("corrections before it acted earlier than they were counted (alarm {alarm})").format(alarm=alarm)
+    for begins, words in DROPPED.items():
+        if reason.startswith(begins):
+            return words().format(reason.removeprefix(begins).strip())
     return reason
 
 

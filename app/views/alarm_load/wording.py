@@ -27,6 +27,7 @@ def made_by(kind: str) -> str:
         "offset_differs": _("offset that the control reports"),
         "opposite_effect": _("factor, or the offset register"),
         "strong_effect": _("factor, or the offset register"),
+        "still_out": _("tolerance R35, reached again after each correction"),
         "early_effect": _("the machine's clock, or what it says is in effect"),
         "correction_in_doubt": _("what the machine says is in effect"),
         "unusual_gain": _("factor"),

@@ -65,6 +65,10 @@ DATA: dict[str, list[dict[str, Any]]] = {
     "implausible": [_SIZE],
     "opposite_effect": [_GAIN | {"corrections": [_STEP, _STEP]}],
     "strong_effect": [_GAIN | {"corrections": [_STEP, _STEP], "parts": 9, "out": 8}],
+    "still_out": [
+        {"characteristic": "seat", "out": 5, "deviations": [0.009, -0.0085, 0.009, -0.009, 0.0095]} | more
+        for more in ({}, *({"gain": gain, "error": 0.12} for gain in (-1.0, 0.0, 0.5, 1.0, 2.0)))
+    ],
     "early_effect": [
         {"characteristic": "seat", "share": 0.98, "error": 0.09, "after": 1, "lag": 7200.0, "by": by}
         for by in ("machined_at", "correction_in_effect", "confirmation")

@@ -1,6 +1,7 @@
-"""The guards before each correction: corrections that did the opposite of what they asked, or too much, or act before they are counted.
+"""The guards before each correction: corrections that do the opposite of what they ask, too much, or nothing for parts out of tolerance,
+or act before they are counted.
 
-Judged by `app.core.gain`, `app.core.overshoot` and `app.core.early` on the newest parts of the stream (`PendingStream.parts`), when the
+Judged by `app.core.gain`, `app.core.overshoot`, `app.core.early` and `app.core.still_out` on the newest parts of the stream (`PendingStream.parts`), when the
 next correction would go out; each pauses the tool. A reading that asks for nothing is not judged, it is only remembered: the quiet readings of a
 batch included (`columnar`).
 """
@@ -10,22 +11,29 @@ from datetime import datetime
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from app.core.decision.decide import Decision
 from app.core.decision.limits import Zone, nanometres
+from app.core.decision.step import Action
 from app.core.early import acts_early
-from app.core.gain import LONGEST, Opposed, Step, against, expected_scatter, opposed
+from app.core.gain import LONGEST, Opposed, Step, against, expected_scatter, gain_of, opposed
 from app.core.overshoot import Overshoot, overshoot
+from app.core.still_out import MOST, Judged, parts_still_out
 from app.loop.readings.schemas import ReadingIn
 from app.loop.readings.writer.doubts import follow_statuses
 from app.loop.readings.writer.pending import PendingAlarm, PendingStream, PendingTool, PendingWrites
 from app.loop.readings.writer.snapshot import Part
-from app.loop.tables.tools import EARLY, OPPOSITE, STRONG
+from app.loop.tables.tools import EARLY, OPPOSITE, STILL_OUT, STRONG
+
+Fault = tuple[str, dict[str, Any]]
+"""Kind of the alarm that pauses a tool, and its data."""
 
 
 def part_of(sequence: int, decision: Decision, compensated: float) -> Part:
     """Return what a reading tells of the effect of corrections. compensated: the sum of those its part was cut with, mm."""
-    return Part(sequence, decision.deviation, compensated, decision.decided - decision.deviation)
+    outstanding = decision.decided - decision.deviation
+    return Part(sequence, decision.deviation, compensated, outstanding, decision.action is Action.CORRECT)
 
 
 def remember(stream: PendingStream, sequence: int, decision: Decision, compensated: float | None) -> None:
@@ -37,32 +45,43 @@ def remember(stream: PendingStream, sequence: int, decision: Decision, compensat
 def pauses(
     pending: PendingWrites, stream: PendingStream, newest: Part | None, reading: ReadingIn, now: datetime
 ) -> PendingAlarm | None:
-    """Pause the tool if its corrections do the opposite of what they ask, or too much, or act before they are counted; the alarm.
+    """Pause the tool if its corrections do the opposite of what they ask, too much or nothing, or act before they are counted; the alarm.
 
     newest: what is left of the reading that asks for the next correction; None if none does.
     """
-    tool, parameters = stream.tool, stream.parameters
+    tool = stream.tool
     if tool is None or newest is None:
         return None
     parts = [*stream.parts[1 - LONGEST :], newest]
     begin = sum(part.sequence <= stream.start.gain_from for part in parts)
     if len(parts) - begin < 3:
         return None
-    deviation, compensated = (
-        np.array([part.deviation for part in parts]),
-        np.array([part.compensated for part in parts]),
+    fault = (
+        _fault(stream, tool, parts, begin)
+        or _early(stream, parts, begin, reading, now)
+        or _still_out(stream, parts, begin)
     )
-    expected = expected_scatter(parameters.zero_range, parameters.averaging_limit)
-    gauged = (deviation, compensated, parameters.factor, begin, expected, parameters.averaging_limit)
+    return None if fault is None else paused(pending, stream, tool, newest.deviation, *fault)
+
+
+def _fault(stream: PendingStream, tool: PendingTool, parts: Sequence[Part], begin: int) -> Fault | None:
+    """Tell if the gain of the corrections is opposite or too strong."""
+    parameters = stream.parameters
+    gauged = (*_sizes(parts), parameters.factor, begin, _scatter(stream), parameters.averaging_limit)
     if (found := opposed(*gauged)) is not None:
-        return paused(pending, stream, tool, newest.deviation, OPPOSITE, _gain(tool, found))
+        return OPPOSITE, _gain(tool, found)
     if (strong := overshoot(*gauged, parameters.half)) is not None:
-        seen = {"parts": strong.parts, "out": strong.out}
-        return paused(pending, stream, tool, newest.deviation, STRONG, _gain(tool, strong) | seen)
+        return STRONG, _gain(tool, strong) | {"parts": strong.parts, "out": strong.out}
+    return None
+
+
+def _early(stream: PendingStream, parts: Sequence[Part], begin: int, reading: ReadingIn, now: datetime) -> Fault | None:
+    """Tell if corrections act before they are counted."""
+    parameters = stream.parameters
     if parameters.rules.of_tool or not any(part.outstanding for part in parts):
         return None
     outstanding = np.array([part.outstanding for part in parts])
-    after, share, error = acts_early(deviation, compensated, outstanding, parameters.factor, begin, expected)
+    after, share, error = acts_early(*_sizes(parts), outstanding, parameters.factor, begin, _scatter(stream))
     if after < 0:
         return None
     said: dict[str, Any] = {"after": after, "share": round(share, 3), "error": round(error, 3), "by": "confirmation"}
@@ -70,7 +89,22 @@ def pauses(
         said["by"] = "correction_in_effect"
     elif reading.machined_at is not None:
         said |= {"by": "machined_at", "lag": round((now - reading.machined_at).total_seconds(), 1)}
-    return paused(pending, stream, tool, newest.deviation, EARLY, said)
+    return EARLY, said
+
+
+def _still_out(stream: PendingStream, parts: Sequence[Part], begin: int) -> Fault | None:
+    """Tell if parts stay out of tolerance although each was corrected for. The size of a tool itself shows no correction."""
+    parameters = stream.parameters
+    if parameters.rules.of_tool:
+        return None
+    judged = [Judged(part.deviation, part.deviation + part.outstanding, part.corrected) for part in parts[begin:]]
+    out = parts_still_out(judged, parameters.limits, parameters.rules.max_step / abs(parameters.factor))
+    if not out:
+        return None
+    said: dict[str, Any] = {"out": out, "deviations": [part.deviation for part in parts[-MOST:]]}
+    if (shown := gain_of(*_sizes(parts), parameters.factor, begin, _scatter(stream))) is not None:
+        said |= {"gain": round(shown[0], 3), "error": round(shown[1], 3)}
+    return STILL_OUT, said
 
 
 def paused(
@@ -104,16 +138,19 @@ def name_correction(alarms: Sequence[PendingAlarm], stream: PendingStream, newes
     if not alarms or newest is None or stream.tool is None:
         return
     parts = [part for part in stream.parts[1 - LONGEST :] if part.sequence > stream.start.gain_from] + [newest]
-    parameters = stream.parameters
-    found = against(
-        np.array([part.deviation for part in parts]),
-        np.array([part.compensated for part in parts]),
-        parameters.factor,
-        expected_scatter(parameters.zero_range, parameters.averaging_limit),
-    )
+    found = against(*_sizes(parts), stream.parameters.factor, _scatter(stream))
     if found is not None:
         for alarm in alarms:
             alarm.data["against"] = _said(stream.tool, found)
+
+
+def _sizes(parts: Sequence[Part]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return deviations, and sums of the corrections that parts were cut with."""
+    return np.array([part.deviation for part in parts]), np.array([part.compensated for part in parts])
+
+
+def _scatter(stream: PendingStream) -> float:
+    return expected_scatter(stream.parameters.zero_range, stream.parameters.averaging_limit)
 
 
 def _gain(tool: PendingTool, found: Opposed | Overshoot) -> dict[str, Any]:

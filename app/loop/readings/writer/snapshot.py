@@ -58,7 +58,7 @@ class LoadedTool(msgspec.Struct, frozen=True, kw_only=True, array_like=True):
 
     set_by_hand: somebody has set the offset since the tool was changed. paused_by: the alarm that pauses it. Of the applied
     corrections there are those with a higher number than `since_number`, and those applied after `since`. applied: numbers
-    and amounts of the newest, to name them by.
+    and amounts of the newest, to name them by. untaken: the alarm that the machine does not take them.
     """
 
     machine_id: int
@@ -72,6 +72,7 @@ class LoadedTool(msgspec.Struct, frozen=True, kw_only=True, array_like=True):
     since_number: int | None = None
     since: datetime | None = None
     applied: Sequence[tuple[int, float]] = ()
+    untaken: int | None = None
 
 
 class LoadedAverage(NamedTuple):
@@ -86,13 +87,14 @@ class LoadedAverage(NamedTuple):
 class Part(NamedTuple):
     """A reading that tells of the effect of corrections: its deviation, and the sum of those its part was cut with, mm.
 
-    outstanding: by how much those that it was cut without will change the size, mm.
+    outstanding: by how much those that it was cut without will change the size, mm. corrected: a correction went out for it.
     """
 
     sequence: int
     deviation: float
     compensated: float
     outstanding: float
+    corrected: bool = False
 
 
 class Arrival(NamedTuple):

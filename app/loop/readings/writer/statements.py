@@ -17,7 +17,7 @@ from app.core.variants import Results
 from app.db.events import CHANNEL, PUBLISHED
 from app.loop.readings.records import Record
 from app.loop.readings.writer.snapshot import MOST_APPLIED
-from app.loop.tables.tools import ASKED_AGAIN, DOUBT
+from app.loop.tables.tools import ASKED_AGAIN, DOUBT, UNTAKEN
 
 _json = msgspec.json.Encoder(enc_hook=list)  # a list that is shared by many rows
 
@@ -72,7 +72,8 @@ SELECT json_build_object(
                 s.sequence, s.parameters_version, a.location, t.number, s.paused_by, s.last_measured_at, s.level,
                 s.level_sequence, s.gain_from,
                 coalesce(CASE WHEN t.number IS NOT NULL THEN (
-                    SELECT json_agg(json_build_array(r.sequence, r.deviation, r.compensated, r.decided - r.deviation)
+                    SELECT json_agg(json_build_array(r.sequence, r.deviation, r.compensated, r.decided - r.deviation,
+                        r.action = 'correct')
                         ORDER BY r.sequence)
                     FROM reading r
                     WHERE r.machine_id = s.machine_id AND r.characteristic_id = s.characteristic_id
@@ -126,7 +127,11 @@ SELECT json_build_object(
                         WHERE machine_id = t.machine_id AND tool_memory = t.number AND status = 'applied'
                         ORDER BY number DESC LIMIT {MOST_APPLIED}
                     ) c
-                ), '[]')
+                ), '[]'),
+                (
+                    SELECT id FROM alarm a WHERE a.machine_id = t.machine_id AND a.tool_memory = t.number
+                        AND a.characteristic_id IS NULL AND a.kind = '{UNTAKEN}' AND a.acknowledged_at IS NULL
+                )
             ) END))
         FROM (
             SELECT machine_id, machine, characteristic_id, characteristic, number, least(
