@@ -11,8 +11,8 @@ wear               < R36          computed in full, held, alarm               un
 probe fault        >= R36         none, alarm, the decision is to stop        unchanged
 =================  =============  ==========================================  ====================
 
-**Where nothing may be corrected** - compensation is paused, or the sum of the corrections has come to its limit - a part out of
-tolerance is one of a series, for nothing brings the next one back: the decision is to stop.
+**Where nothing may be corrected** - compensation is paused, or the sum of the corrections has come to its limit - or the machine does
+not take corrections, a part out of tolerance is one of a series, for nothing brings the next one back: the decision is to stop.
 
 ``M_new = M_old - M_old/k + D/k`` from 0: an exponentially weighted average with lambda = 1/k (R29).
 
@@ -114,6 +114,7 @@ def decide(
     jump: bool = False,
     fault: Code | None = None,
     by_hand: bool = False,
+    not_taken: bool = False,
 ) -> Decision:
     """Decide one reading (domain §3).
 
@@ -128,6 +129,7 @@ def decide(
         it says nothing to the average. In the wear zone the alarm *tool worn* asks the same already.
     by_hand: the size is that of the tool itself, and somebody has set its offset since it was changed: nobody knows how much
         of it that offset has in it already, so nothing is corrected until the tool is changed.
+    not_taken: the machine does not take the corrections of this tool.
     fault: why the reading cannot be believed whatever D is: the probe triggered on its way to the surface (domain §5, *not a
         bore*), or a touch is missing or outside its window (domain §4). A probe fault, as is a value beyond a natural limit.
 
@@ -148,6 +150,7 @@ def decide(
         jump,
         BELIEVED if fault is None else CODES.index(fault),
         by_hand,
+        not_taken,
     )
     size = judged_size(parameters.rules, deviation, made.decided)
     good = within_tolerance(size, parameters.limits) and fault is None and made.code != BEYOND_NATURAL_LIMIT

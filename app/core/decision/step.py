@@ -61,6 +61,7 @@ class Code(StrEnum):
     TOUCH_FAULT = "touch_fault"
     OFFSET_BY_HAND = "offset_by_hand"
     BEYOND_NATURAL_LIMIT = "beyond_natural_limit"
+    NOT_TAKEN = "not_taken"
 
 
 CODES = tuple(Code)
@@ -69,6 +70,7 @@ TOOL_WORN_HELD, TOOL_WORN_RELEASED, PROBE_FAULT, PAUSED, MEASURE_ONLY = range(5,
 BEFORE_TOOL_CHANGE, OFFSET_LIMIT, REJECTED, IMPLAUSIBLE, IMPORTED, FIRST_MOVE_TRIGGERED, TOUCH_FAULT = range(10, 17)
 OFFSET_BY_HAND = 17
 BEYOND_NATURAL_LIMIT = 18
+NOT_TAKEN = 19
 BELIEVED = -1
 
 
@@ -200,10 +202,12 @@ def step(
     jump: bool,
     fault: int,
     by_hand: bool = False,
+    not_taken: bool = False,
 ) -> Step:
     """Decide one reading as `decide` explains. average: M before it; total: sum of the corrections of the tool.
 
-    fault: the code why it cannot be believed whatever its size, else `BELIEVED`.
+    fault: the code why it cannot be believed whatever its size, else `BELIEVED`. not_taken: the machine takes no corrections of the
+    tool, so what is outstanding brings nothing back either.
     """
     before = average if rules.averages else 0.0
     decided = rounded(deviation + outstanding) if outstanding else deviation
@@ -221,6 +225,12 @@ def step(
         return without_correction(decided, zone, PAUSED, before, NONE if previous_tool else lost)
     if previous_tool:
         return without_correction(decided, zone, BEFORE_TOOL_CHANGE, before)
+    if (
+        not_taken
+        and not rules.measures_only
+        and not within(nanometres(judged_size(rules, deviation, decided)), rules.tolerance)
+    ):
+        return without_correction(decided, zone, NOT_TAKEN, before, STOP)
     if rejected and not rules.rejected_may_correct:
         return without_correction(decided, zone, REJECTED, before)
 

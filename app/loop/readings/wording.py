@@ -210,6 +210,11 @@ def _sentence(values: _Values) -> str:
             text = _(
                 "Deviation %(deviation)s: compensation is paused by alarm %(alarm)s. Stored and judged, nothing is corrected."
             )
+        case Code.NOT_TAKEN:
+            text = _(
+                "Deviation %(raw)s: the part is out of tolerance, and the machine does not take the corrections of this tool (alarm "
+                "%(alarm)s). Nothing more is corrected by this part."
+            )
         case Code.MEASURE_ONLY:
             text = _("Deviation %(deviation)s: this characteristic is only measured, nothing is corrected.")
         case Code.OFFSET_BY_HAND:

@@ -66,6 +66,23 @@ def test_parts_that_are_cut_long_after_a_correction_raise_an_alarm(shop: Shop, r
     assert (ended["state"], ended["outcome"][0]["code"]) == ("acknowledged", "corrections_taken")
 
 
+def test_parts_out_of_tolerance_stop_the_machine_that_takes_nothing(shop: Shop, runs: Runs) -> None:
+    """What was counted in is not in the offset: the next part is out as well. Once it is taken, the loop goes on."""
+    shop.read(9, measured_at=ago(minutes=50), correction_in_effect=0)
+    waited(shop, 50)
+    on_its_way = shop.read(9, measured_at=ago(minutes=1), correction_in_effect=0)
+    assert (on_its_way["action"], on_its_way["reason"]["code"]) == ("none", "within_zero_range")
+    [alarm] = runs()
+    assert "asks the machine to stop" in alarm["text"]
+    answer = shop.read(9, correction_in_effect=0)
+    assert (answer["action"], answer["reason"]["code"], answer["correction"]) == ("stop", "not_taken", None)
+    assert f"does not take the corrections of this tool (alarm {alarm['id']})" in answer["reason"]["text"]
+    assert shop.read(8, correction_in_effect=0)["action"] == "none", "in tolerance"
+    shop.correction(1, "applied")
+    assert shop.read(9, correction_in_effect=1)["action"] == "correct"
+    assert runs(1) == []
+
+
 def test_corrections_in_a_row_raise_it_sooner(shop: Shop, runs: Runs) -> None:
     for size in (6, 12, 18, 24, 30):  # each is decided as if the corrections before it were in the offset
         shop.read(size)
@@ -94,7 +111,7 @@ def test_what_the_bridge_says_of_the_control_is_in_the_alarm(shop: Shop, runs: R
     waited(shop, 6)
     beat(shop, locations=[{"tool_memory": 3}], detail="Correction 1 waits: tool 3 is in use.")
     [alarm] = runs(3)
-    assert alarm["text"].endswith("Its bridge says: Correction 1 waits: tool 3 is in use.")
+    assert "Its bridge says: Correction 1 waits: tool 3 is in use. Meanwhile" in alarm["text"]
 
 
 def test_what_the_bridge_says_of_other_tools_is_not_in_the_alarm(shop: Shop, runs: Runs) -> None:
@@ -105,7 +122,7 @@ def test_what_the_bridge_says_of_other_tools_is_not_in_the_alarm(shop: Shop, run
     said = "The date of the control is wrong."
     beat(shop, locations=[{"tool_memory": 3}], held_back=[other], detail=f"{said} {other['reason']}")
     [alarm] = runs(3)
-    assert alarm["text"].endswith(f"Its bridge says: {said}")
+    assert f"Its bridge says: {said} Meanwhile" in alarm["text"]
 
 
 def test_what_the_bridge_holds_back_is_reported_at_once_with_its_reason(shop: Shop, runs: Runs) -> None:
@@ -114,7 +131,7 @@ def test_what_the_bridge_holds_back_is_reported_at_once_with_its_reason(shop: Sh
     assert runs(2) == [], "on hold by command"
     beat(shop, held_back=[HELD, HELD | {"tool_memory": 4}])
     [alarm] = runs(1)
-    assert alarm["text"].endswith("reaches the machine: Tool memory 3 has no location.")
+    assert "reaches the machine: Tool memory 3 has no location. Meanwhile" in alarm["text"]
     assert shop.call("GET", f"/machines/{shop.machine}/connection")["held_back"][0] == HELD
     beat(shop)
     assert runs(1) == []

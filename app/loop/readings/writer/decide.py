@@ -113,6 +113,7 @@ def decide_reading(pending: PendingWrites, entry: Entry, reading: ReadingIn, now
             previous_tool=previous_tool and not as_it_is,
             accepted=results is None or not results.rejected,
             jump=jump,
+            not_taken=tool is not None and tool.not_taken,
             by_hand=parameters.rules.of_tool and tool is not None and tool.set_by_hand,
             fault=Code.FIRST_MOVE_TRIGGERED if reading.first_move_triggered else Code.TOUCH_FAULT if fault else None,
         )
@@ -128,6 +129,8 @@ def decide_reading(pending: PendingWrites, entry: Entry, reading: ReadingIn, now
         paused_by, decision = opposed, judged(paused=True)
     if paused_by is not None and lag is not None:
         outstanding = ()
+    if decision.code is Code.NOT_TAKEN and tool is not None:
+        paused_by = tool.untaken
     alarms = [_signal(pending, stream, signal, sequence, decision, results, fault) for signal in decision.alarms]
     name_correction(alarms, stream, newest)
     name_clock(alarms if timed else (), reading, now)

@@ -121,6 +121,7 @@ class PendingTool:
     reset_at: datetime | None = None
     set_by_hand: bool = False
     paused_by: int | PendingAlarm | None = None
+    untaken: int | None = None
     corrections: list[LoadedCorrection | PendingCorrection] = field(default_factory=list)
     applied: list[tuple[int, float]] = field(default_factory=list)
     changed: bool = False
@@ -130,6 +131,11 @@ class PendingTool:
     def forget(self) -> None:
         """Drop what was worked out of the corrections: there are others, or one has another status."""
         self.tallies, self.none_held = {}, 0
+
+    @property
+    def not_taken(self) -> bool:
+        """The machine does not take its corrections, and one still waits."""
+        return self.untaken is not None and any(each.status == "pending" for each in self.corrections)
 
     def changing(self, at: int) -> PendingCorrection:
         """Return the correction at an index, as one that will be written."""
@@ -284,6 +290,7 @@ class PendingWrites:
                 reset_at=start.reset_at,
                 set_by_hand=start.set_by_hand,
                 paused_by=start.paused_by,
+                untaken=start.untaken,
                 corrections=list(start.corrections),
                 applied=list(start.applied),
             )
