@@ -8,8 +8,8 @@ from typing import NamedTuple
 import pytest
 
 from app.core.decision.limits import Limits, nanometres, within_tolerance
-from app.core.decision.step import BELIEVED, CORRECT, HOLD, Rules, effect_of, step
-from app.core.still_out import MOST, Judged, parts_still_out
+from app.core.decision.step import BELIEVED, CORRECT, Rules, effect_of, step
+from app.core.still_out import MOST, Judged, StillOut, still_out
 from tests.chance import runs
 
 HALF = 0.008
@@ -57,9 +57,9 @@ def cut(
             averages[which] = made_of.average
             rows[which].append(Judged(deviation, made_of.decided, made_of.action == CORRECT))
             out[which] += not within_tolerance(deviation, rules)
-            if guarded and made_of.action in (CORRECT, HOLD):
+            if guarded and made_of.action == CORRECT:
                 farthest = rules.max_step / abs(rules.factor)
-                if parts_still_out(rows[which], rules, farthest):
+                if still_out(rows[which], rules, farthest):
                     return Cut(part + 1, True, out)
             if made_of.action == CORRECT:
                 made.append((part + late, effect_of(made_of.amount, rules.factor)))
@@ -114,9 +114,10 @@ def test_small_steps_come_back_in_more_parts_than_five() -> None:
 
 def test_a_worn_tool_that_is_held_is_not_counted() -> None:
     """Nothing went out for it: a person is asked about each, by *tool worn*."""
-    held = [Judged(0.03, 0.03, False)] * 10
-    limits = rules()
-    assert parts_still_out([*held, Judged(0.012, 0.012, True)], limits) == 0
+    held, corrected = Judged(0.03, 0.03, False), Judged(0.012, 0.012, True)
+    assert still_out([*[held] * 10, corrected], rules()) is None
+    assert still_out([*[corrected] * 4, held], rules()) is None
+    assert still_out([*[corrected] * 3, held, *[corrected] * 2], rules()) == StillOut(6, 5)
 
 
 @runs(200, 5_000)

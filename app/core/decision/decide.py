@@ -129,7 +129,7 @@ def decide(
         it says nothing to the average. In the wear zone the alarm *tool worn* asks the same already.
     by_hand: the size is that of the tool itself, and somebody has set its offset since it was changed: nobody knows how much
         of it that offset has in it already, so nothing is corrected until the tool is changed.
-    not_taken: the machine does not take the corrections of this tool.
+    not_taken: the machine does not take the corrections of this tool, so what is counted in is not in the offset.
     fault: why the reading cannot be believed whatever D is: the probe triggered on its way to the surface (domain §5, *not a
         bore*), or a touch is missing or outside its window (domain §4). A probe fault, as is a value beyond a natural limit.
 

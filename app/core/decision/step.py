@@ -225,11 +225,8 @@ def step(
         return without_correction(decided, zone, PAUSED, before, NONE if previous_tool else lost)
     if previous_tool:
         return without_correction(decided, zone, BEFORE_TOOL_CHANGE, before)
-    if (
-        not_taken
-        and not rules.measures_only
-        and not within(nanometres(judged_size(rules, deviation, decided)), rules.tolerance)
-    ):
+    waits = not_taken and not (jump or by_hand or rules.measures_only)
+    if waits and not within(nanometres(judged_size(rules, deviation, decided)), rules.tolerance):
         return without_correction(decided, zone, NOT_TAKEN, before, STOP)
     if rejected and not rules.rejected_may_correct:
         return without_correction(decided, zone, REJECTED, before)

@@ -212,8 +212,8 @@ def _sentence(values: _Values) -> str:
             )
         case Code.NOT_TAKEN:
             text = _(
-                "Deviation %(raw)s: the part is out of tolerance, and the machine does not take the corrections of this tool (alarm "
-                "%(alarm)s). Nothing more is corrected by this part."
+                "Deviation %(raw)s: the machine does not take the corrections of this tool (alarm %(alarm)s), so this part corrects "
+                "nothing more."
             )
         case Code.MEASURE_ONLY:
             text = _("Deviation %(deviation)s: this characteristic is only measured, nothing is corrected.")

@@ -95,11 +95,12 @@ STRONG_EFFECT = register(
 def _still_out(alarm: Alarm) -> str:
     data = alarm.data
     text = _(
-        "{n} parts in a row are out of tolerance, although each was corrected for: {characteristic} was off by {deviations}.{gain} "
-        "Nothing is corrected through tool {tool} until this alarm is answered."
+        "{n} parts of {characteristic} in a row are out of tolerance, the newest by {deviations} off, although corrections in full went "
+        "out for {m} of them.{gain} Nothing is corrected through tool {tool} until this alarm is answered."
     )
     return text.format(
-        n=data.get("out"),
+        n=data.get("parts"),
+        m=data.get("corrected"),
         characteristic=called(alarm),
         deviations=", ".join(map(um, data.get("deviations", ()))),
         gain=f" {_cause(alarm)}" if "gain" in data else "",
@@ -117,7 +118,9 @@ def _cause(alarm: Alarm) -> str:
     elif gain < 0.75:
         cause = _("diameter taken for radius?")
     elif gain < 1.5:
-        cause = _("look at the tool, the clamping and the probe.")
+        cause = _(
+            "does another characteristic of the tool take them back? Look at the edge, the clamping and the probe."
+        )
     else:
         cause = _("radius taken for diameter?")
     return _("The gain of the corrections is {gain} {pm} {error}, it should be 1: {cause}").format(
@@ -132,9 +135,9 @@ STILL_OUT_OF_TOLERANCE = register(
         word=lambda: _("Still out of tolerance"),
         sentence=uncorrected(_still_out),
         what_to_do=lambda: _(
-            "Measure a part by hand. Look at the edge, the clamping and the probe. Check the factor of the characteristic (sign, radius or "
-            "diameter) and the offset register at the control, and whether another characteristic of this tool takes its corrections "
-            "back. Then answer the alarm: parts before it no longer count."
+            "Were the corrections applied, or refused or rejected? Measure a part by hand. Look at the edge, the clamping and the probe. "
+            "Check the factor of the characteristic (sign, radius or diameter), the offset register at the control, and whether another "
+            "characteristic of this tool takes its corrections back. Then answer the alarm: parts before it no longer count."
         ),
         tone="stop",
         actions=("noted", "tool_replaced", "sister_tool"),

@@ -34,7 +34,7 @@ SETTLES = timedelta(minutes=5)
 
 
 class Untaken(NamedTuple):
-    """Pending corrections of a tool. waiting: how many; most: of one characteristic; first, since: the oldest; measured: its last part.
+    """Pending corrections of a tool. waiting: how many; most: of one characteristic; first, since: the oldest; last: the newest; measured: its last part.
 
     reason: why its bridge holds them back, if it says so and not because of a hold. said: what it says of the control, and nothing
     of other tools. bridge: the machine has one; carried: which brings corrections.
@@ -46,6 +46,7 @@ class Untaken(NamedTuple):
     waiting: int
     most: int
     first: int
+    last: int
     since: datetime
     measured: datetime | None
     reason: str | None
@@ -139,7 +140,13 @@ def untaken(session: Session, machine_id: int | None = None) -> list[Untaken]:
     since = func.min(func.coalesce(Correction.decided_at, Correction.created_at))
     place = (Correction.machine_id, Correction.tool_memory)
     each = (
-        select(*place, func.count().label("waiting"), func.min(Correction.number).label("first"), since.label("since"))
+        select(
+            *place,
+            func.count().label("waiting"),
+            func.min(Correction.number).label("first"),
+            func.max(Correction.number).label("last"),
+            since.label("since"),
+        )
         .where(Correction.status == "pending", Correction.fetched_at.is_(None))
         .group_by(*place, Correction.characteristic_id)
         .subquery()
@@ -151,6 +158,7 @@ def untaken(session: Session, machine_id: int | None = None) -> list[Untaken]:
             func.sum(each.c.waiting).label("waiting"),
             func.max(each.c.waiting).label("most"),
             func.min(each.c.first).label("first"),
+            func.max(each.c.last).label("last"),
             func.min(each.c.since).label("since"),
         )
         .group_by(each.c.machine_id, each.c.tool_memory)
@@ -183,6 +191,7 @@ def _untaken(row: Row[Any]) -> Untaken:
         waiting=int(row.waiting),
         most=row.most,
         first=row.first,
+        last=row.last,
         since=row.since,
         measured=row.measured,
         reason=reason,
@@ -207,6 +216,7 @@ def _values(waiting: Untaken) -> dict[str, Any]:
     return {
         "waiting": waiting.waiting,
         "first": waiting.first,
+        "last": waiting.last,
         "since": waiting.since.isoformat(),
         "reason": waiting.reason,
         "said": waiting.said,

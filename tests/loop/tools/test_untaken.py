@@ -78,9 +78,11 @@ def test_parts_out_of_tolerance_stop_the_machine_that_takes_nothing(shop: Shop, 
     assert (answer["action"], answer["reason"]["code"], answer["correction"]) == ("stop", "not_taken", None)
     assert f"does not take the corrections of this tool (alarm {alarm['id']})" in answer["reason"]["text"]
     assert shop.read(8, correction_in_effect=0)["action"] == "none", "in tolerance"
+    shop.acknowledge(alarm["id"], "noted")
+    assert shop.read(9, correction_in_effect=0)["action"] == "stop", "an answer brings no correction into the offset"
     shop.correction(1, "applied")
     assert shop.read(9, correction_in_effect=1)["action"] == "correct"
-    assert runs(1) == []
+    assert shop.read(9, correction_in_effect=1)["action"] == "none", "the next one is on its way, not left"
 
 
 def test_corrections_in_a_row_raise_it_sooner(shop: Shop, runs: Runs) -> None:

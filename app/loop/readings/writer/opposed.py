@@ -19,7 +19,7 @@ from app.core.decision.step import Action
 from app.core.early import acts_early
 from app.core.gain import LONGEST, Opposed, Step, against, expected_scatter, gain_of, opposed
 from app.core.overshoot import Overshoot, overshoot
-from app.core.still_out import MOST, Judged, parts_still_out
+from app.core.still_out import MOST, Judged, still_out
 from app.loop.readings.schemas import ReadingIn
 from app.loop.readings.writer.doubts import follow_statuses
 from app.loop.readings.writer.pending import PendingAlarm, PendingStream, PendingTool, PendingWrites
@@ -98,10 +98,10 @@ def _still_out(stream: PendingStream, parts: Sequence[Part], begin: int) -> Faul
     if parameters.rules.of_tool:
         return None
     judged = [Judged(part.deviation, part.deviation + part.outstanding, part.corrected) for part in parts[begin:]]
-    out = parts_still_out(judged, parameters.limits, parameters.rules.max_step / abs(parameters.factor))
-    if not out:
+    found = still_out(judged, parameters.limits, parameters.rules.max_step / abs(parameters.factor))
+    if found is None:
         return None
-    said: dict[str, Any] = {"out": out, "deviations": [part.deviation for part in parts[-MOST:]]}
+    said: dict[str, Any] = found._asdict() | {"deviations": [part.deviation for part in parts[-MOST:]]}
     if (shown := gain_of(*_sizes(parts), parameters.factor, begin, _scatter(stream))) is not None:
         said |= {"gain": round(shown[0], 3), "error": round(shown[1], 3)}
     return STILL_OUT, said

@@ -121,7 +121,7 @@ class PendingTool:
     reset_at: datetime | None = None
     set_by_hand: bool = False
     paused_by: int | PendingAlarm | None = None
-    untaken: int | None = None
+    untaken: tuple[int, int] | None = None
     corrections: list[LoadedCorrection | PendingCorrection] = field(default_factory=list)
     applied: list[tuple[int, float]] = field(default_factory=list)
     changed: bool = False
@@ -133,9 +133,13 @@ class PendingTool:
         self.tallies, self.none_held = {}, 0
 
     @property
-    def not_taken(self) -> bool:
-        """The machine does not take its corrections, and one still waits."""
-        return self.untaken is not None and any(each.status == "pending" for each in self.corrections)
+    def not_taken(self) -> int | None:
+        """The alarm that the machine does not take its corrections, answered or not, while one of which it spoke still waits."""
+        if self.untaken is None:
+            return None
+        alarm, last = self.untaken
+        waits = any(each.status == "pending" and each.number <= last for each in self.corrections)
+        return alarm if waits else None
 
     def changing(self, at: int) -> PendingCorrection:
         """Return the correction at an index, as one that will be written."""

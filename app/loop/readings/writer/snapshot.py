@@ -58,7 +58,8 @@ class LoadedTool(msgspec.Struct, frozen=True, kw_only=True, array_like=True):
 
     set_by_hand: somebody has set the offset since the tool was changed. paused_by: the alarm that pauses it. Of the applied
     corrections there are those with a higher number than `since_number`, and those applied after `since`. applied: numbers
-    and amounts of the newest, to name them by. untaken: the alarm that the machine does not take them.
+    and amounts of the newest, to name them by. untaken: the newest alarm that
+    the machine does not take them, and the last of which it spoke.
     """
 
     machine_id: int
@@ -72,7 +73,7 @@ class LoadedTool(msgspec.Struct, frozen=True, kw_only=True, array_like=True):
     since_number: int | None = None
     since: datetime | None = None
     applied: Sequence[tuple[int, float]] = ()
-    untaken: int | None = None
+    untaken: tuple[int, int] | None = None
 
 
 class LoadedAverage(NamedTuple):
@@ -87,7 +88,8 @@ class LoadedAverage(NamedTuple):
 class Part(NamedTuple):
     """A reading that tells of the effect of corrections: its deviation, and the sum of those its part was cut with, mm.
 
-    outstanding: by how much those that it was cut without will change the size, mm. corrected: a correction went out for it.
+    outstanding: by how much those that it was cut without will change the size, mm. corrected: a correction went out for it, by the
+    parameters of today.
     """
 
     sequence: int

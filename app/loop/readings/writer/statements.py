@@ -73,7 +73,7 @@ SELECT json_build_object(
                 s.level_sequence, s.gain_from,
                 coalesce(CASE WHEN t.number IS NOT NULL THEN (
                     SELECT json_agg(json_build_array(r.sequence, r.deviation, r.compensated, r.decided - r.deviation,
-                        r.action = 'correct')
+                        r.action = 'correct' AND r.parameters_version = s.parameters_version)
                         ORDER BY r.sequence)
                     FROM reading r
                     WHERE r.machine_id = s.machine_id AND r.characteristic_id = s.characteristic_id
@@ -129,8 +129,9 @@ SELECT json_build_object(
                     ) c
                 ), '[]'),
                 (
-                    SELECT id FROM alarm a WHERE a.machine_id = t.machine_id AND a.tool_memory = t.number
-                        AND a.characteristic_id IS NULL AND a.kind = '{UNTAKEN}' AND a.acknowledged_at IS NULL
+                    SELECT json_build_array(a.id, a.data -> 'last') FROM alarm a
+                    WHERE a.machine_id = t.machine_id AND a.tool_memory = t.number AND a.characteristic_id IS NULL
+                        AND a.kind = '{UNTAKEN}' AND a.data ? 'last' ORDER BY a.id DESC LIMIT 1
                 )
             ) END))
         FROM (
