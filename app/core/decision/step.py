@@ -206,8 +206,7 @@ def step(
 ) -> Step:
     """Decide one reading as `decide` explains. average: M before it; total: sum of the corrections of the tool.
 
-    fault: the code why it cannot be believed whatever its size, else `BELIEVED`. not_taken: the machine takes no corrections of the
-    tool, so what is outstanding brings nothing back either.
+    fault: the code why it cannot be believed whatever its size, else `BELIEVED`. not_taken: the machine takes no corrections.
     """
     before = average if rules.averages else 0.0
     decided = rounded(deviation + outstanding) if outstanding else deviation

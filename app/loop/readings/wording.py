@@ -167,89 +167,87 @@ def first_move_sentence(feature: str | None) -> str:
             return _("The first move of the probe triggered: there is no bore here, or a chip, or the wrong part.")
 
 
+_SENTENCES: dict[str, Callable[[], str]] = {
+    Code.WITHIN_ZERO_RANGE: lambda: _(
+        "Deviation %(deviation)s is within the zero range %(zero)s: no correction, the average is kept."
+    ),
+    Code.AVERAGE_KEPT: lambda: _(
+        "Deviation %(deviation)s is within the averaging limit %(averaging)s and the running average %(average)s "
+        "within the zero range %(zero)s: no correction, the average is kept."
+    ),
+    Code.AVERAGED_DEVIATION: lambda: _(
+        "The running average %(averaged)s is beyond the zero range %(zero)s: corrected by the average."
+    ),
+    Code.FULL_DEVIATION: lambda: _(
+        "Deviation %(deviation)s is beyond the averaging limit %(averaging)s: corrected in full."
+    ),
+    Code.OUT_OF_TOLERANCE: lambda: _(
+        "Deviation %(deviation)s is beyond the tolerance ±%(tolerance)s: corrected in full."
+    ),
+    Code.TOOL_WORN_HELD: lambda: _(
+        "Deviation %(worn)s has reached the wear limit %(wear)s: the tool is worn. "
+        "Correction %(number)s is held until it is decided."
+    ),
+    Code.TOOL_WORN_RELEASED: lambda: _(
+        "Deviation %(worn)s has reached the wear limit %(wear)s: the tool is worn. "
+        "Corrected in full, as this characteristic is set to release."
+    ),
+    Code.PROBE_FAULT: lambda: _(
+        "Deviation %(raw)s has reached the confidence limit %(confidence)s: the probe or the program is wrong. "
+        "The decision is to stop, and compensation pauses until the alarm is acknowledged."
+    ),
+    Code.PAUSED: lambda: _(
+        "Deviation %(deviation)s: compensation is paused by alarm %(alarm)s. Stored and judged, nothing is corrected."
+    ),
+    Code.NOT_TAKEN: lambda: _(
+        "Deviation %(raw)s: the machine does not take the corrections of this tool (alarm %(alarm)s), so this part corrects "
+        "nothing more."
+    ),
+    Code.MEASURE_ONLY: lambda: _(
+        "Deviation %(deviation)s: this characteristic is only measured, nothing is corrected."
+    ),
+    Code.OFFSET_BY_HAND: lambda: _(
+        "Deviation %(deviation)s: somebody has set the offset of this tool since it was changed, and nobody knows how much "
+        "of the size of the tool is in it. Nothing is corrected until the tool change is reported."
+    ),
+    Code.IMPORTED: lambda: _(
+        "Deviation %(deviation)s: imported from a file. Judged like any other, it corrects nothing."
+    ),
+    Code.BEFORE_TOOL_CHANGE: lambda: _(
+        "Deviation %(deviation)s: the part was cut before the tool was changed or its offset edited, "
+        "so it says nothing about the offset of now. Nothing is corrected."
+    ),
+    Code.OFFSET_LIMIT: lambda: _(
+        "Deviation %(deviation)s corrects nothing: the corrections of this tool would exceed %(total)s in all. "
+        "Nothing is corrected until the tool is changed, or the largest sum is raised."
+    ),
+    Code.IMPLAUSIBLE: lambda: _(
+        "Deviation %(deviation)s lies more than the plausible %(jump)s from the level of the readings before: neither "
+        "wear nor scatter explains it. Correction %(number)s is held until it is decided."
+    ),
+    Code.REJECTED: lambda: _(
+        "Fewer than %(n)s of %(m)s sections are within the tolerance: the part is rejected and corrects nothing."
+    ),
+    Code.BEYOND_NATURAL_LIMIT: lambda: _(
+        "Deviation %(raw)s lies beyond the natural limit, where no part can be, by more than the zero range %(zero)s: the "
+        "probe, the zero or the sign is wrong."
+    ),
+}
+
+
 def _sentence(values: _Values) -> str:
-    record, parameters = values.record, values.parameters
-    match record.code:
-        case Code.WITHIN_ZERO_RANGE:
-            text = _("Deviation %(deviation)s is within the zero range %(zero)s: no correction, the average is kept.")
-        case Code.AVERAGE_KEPT:
-            text = _(
-                "Deviation %(deviation)s is within the averaging limit %(averaging)s and the running average %(average)s "
-                "within the zero range %(zero)s: no correction, the average is kept."
-            )
-        case Code.AVERAGED_DEVIATION:
-            text = _("The running average %(averaged)s is beyond the zero range %(zero)s: corrected by the average.")
-        case Code.FULL_DEVIATION:
-            text = _("Deviation %(deviation)s is beyond the averaging limit %(averaging)s: corrected in full.")
-        case Code.OUT_OF_TOLERANCE:
-            text = _("Deviation %(deviation)s is beyond the tolerance ±%(tolerance)s: corrected in full.")
-        case Code.TOOL_WORN_HELD:
-            text = _(
-                "Deviation %(worn)s has reached the wear limit %(wear)s: the tool is worn. "
-                "Correction %(number)s is held until it is decided."
-            )
-        case Code.TOOL_WORN_RELEASED:
-            text = _(
-                "Deviation %(worn)s has reached the wear limit %(wear)s: the tool is worn. "
-                "Corrected in full, as this characteristic is set to release."
-            )
-        case Code.PROBE_FAULT:
-            text = _(
-                "Deviation %(raw)s has reached the confidence limit %(confidence)s: the probe or the program is wrong. "
-                "The decision is to stop, and compensation pauses until the alarm is acknowledged."
-            )
-        case Code.BEYOND_NATURAL_LIMIT:
-            text = _(
-                "Deviation %(raw)s lies beyond the natural limit, where no part can be, by more than the zero range %(zero)s: the "
-                "probe, the zero or the sign is wrong."
-            )
-            text = f"{text} {_stopped()}"
-        case Code.FIRST_MOVE_TRIGGERED:
-            text = f"{first_move_sentence(parameters.feature)} {_stopped()}"
-        case Code.PAUSED:
-            text = _(
-                "Deviation %(deviation)s: compensation is paused by alarm %(alarm)s. Stored and judged, nothing is corrected."
-            )
-        case Code.NOT_TAKEN:
-            text = _(
-                "Deviation %(raw)s: the machine does not take the corrections of this tool (alarm %(alarm)s), so this part corrects "
-                "nothing more."
-            )
-        case Code.MEASURE_ONLY:
-            text = _("Deviation %(deviation)s: this characteristic is only measured, nothing is corrected.")
-        case Code.OFFSET_BY_HAND:
-            text = _(
-                "Deviation %(deviation)s: somebody has set the offset of this tool since it was changed, and nobody knows how much "
-                "of the size of the tool is in it. Nothing is corrected until the tool change is reported."
-            )
-        case Code.IMPORTED:
-            text = _("Deviation %(deviation)s: imported from a file. Judged like any other, it corrects nothing.")
-        case Code.BEFORE_TOOL_CHANGE:
-            text = _(
-                "Deviation %(deviation)s: the part was cut before the tool was changed or its offset edited, "
-                "so it says nothing about the offset of now. Nothing is corrected."
-            )
-        case Code.OFFSET_LIMIT:
-            text = _(
-                "Deviation %(deviation)s corrects nothing: the corrections of this tool would exceed %(total)s in all. "
-                "Nothing is corrected until the tool is changed, or the largest sum is raised."
-            )
-        case Code.IMPLAUSIBLE if record.correction is None:
-            text = _(
-                "Deviation %(deviation)s lies more than the plausible %(jump)s from the level of the readings before: neither "
-                "wear nor scatter explains it. It is marked, and the average is left as it was."
-            )
-        case Code.IMPLAUSIBLE:
-            text = _(
-                "Deviation %(deviation)s lies more than the plausible %(jump)s from the level of the readings before: neither "
-                "wear nor scatter explains it. Correction %(number)s is held until it is decided."
-            )
-        case Code.REJECTED:
-            text = _(
-                "Fewer than %(n)s of %(m)s sections are within the tolerance: the part is rejected and corrects nothing."
-            )
-        case _:
-            text = record.code
+    code = values.record.code
+    if code == Code.FIRST_MOVE_TRIGGERED:
+        text = first_move_sentence(values.parameters.feature)
+    elif code == Code.IMPLAUSIBLE and values.record.correction is None:
+        text = _(
+            "Deviation %(deviation)s lies more than the plausible %(jump)s from the level of the readings before: neither "
+            "wear nor scatter explains it. It is marked, and the average is left as it was."
+        )
+    else:
+        text = _SENTENCES[code]() if code in _SENTENCES else code
+    if code in (Code.BEYOND_NATURAL_LIMIT, Code.FIRST_MOVE_TRIGGERED):
+        text = f"{text} {_stopped()}"
     return text % values
 
 

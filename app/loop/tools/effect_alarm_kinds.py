@@ -109,7 +109,7 @@ def _still_out(alarm: Alarm) -> str:
 
 
 def _cause(alarm: Alarm) -> str:
-    """What the gain of the corrections is, and what it is likely to come from."""
+    """The gain of the corrections, and its likely cause."""
     gain = float(alarm.data["gain"])
     if gain < -0.25:
         cause = _("wrong sign of the factor?")

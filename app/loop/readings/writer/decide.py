@@ -101,7 +101,6 @@ def decide_reading(pending: PendingWrites, entry: Entry, reading: ReadingIn, now
     paused_by = stream.paused_by if tool is None or stream.paused_by is not None else tool.paused_by
     timed = time_decides(stream, reading, compensated, previous_tool=previous_tool)
     lag = lag_with(pending, stream, reading, Arrival(sequence, now, measured_at, reading.machined_at), timed=timed)
-    not_taken = None if tool is None else tool.not_taken
     total = issued_total(pending, tool) if parameters.max_total is not None else 0.0
 
     def judged(*, paused: bool) -> Decision:
@@ -114,7 +113,7 @@ def decide_reading(pending: PendingWrites, entry: Entry, reading: ReadingIn, now
             previous_tool=previous_tool and not as_it_is,
             accepted=results is None or not results.rejected,
             jump=jump,
-            not_taken=not_taken is not None,
+            not_taken=tool is not None and tool.not_taken is not None,
             by_hand=parameters.rules.of_tool and tool is not None and tool.set_by_hand,
             fault=Code.FIRST_MOVE_TRIGGERED if reading.first_move_triggered else Code.TOUCH_FAULT if fault else None,
         )
@@ -130,8 +129,6 @@ def decide_reading(pending: PendingWrites, entry: Entry, reading: ReadingIn, now
         paused_by, decision = opposed, judged(paused=True)
     if paused_by is not None and lag is not None:
         outstanding = ()
-    if decision.code is Code.NOT_TAKEN:
-        paused_by = not_taken
     alarms = [_signal(pending, stream, signal, sequence, decision, results, fault) for signal in decision.alarms]
     name_correction(alarms, stream, newest)
     name_clock(alarms if timed else (), reading, now)
@@ -152,7 +149,7 @@ def decide_reading(pending: PendingWrites, entry: Entry, reading: ReadingIn, now
         decision=decision,
         outstanding=outstanding,
         correction=correction,
-        paused_by=paused_by,
+        paused_by=tool.not_taken if tool and decision.code is Code.NOT_TAKEN else paused_by,
         alarms=alarms,
         compensated=compensated,
         results=results,
