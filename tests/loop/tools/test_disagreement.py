@@ -32,17 +32,18 @@ class Two:
 
 
 def test_it_is_said_which_two_take_each_others_corrections_back(shop: Shop) -> None:
-    two = Two(shop, apart=14.0)
+    """Within the tolerance: where one stays out of it, the tool is paused before (`test_still_out`)."""
+    two = Two(shop, apart=7.0)
     two.cut(8)
     (alarm,) = two.alarms()
     first, second = two.keys
     assert (alarm["tool_memory"], alarm["characteristic"]) == (4, None)
     assert f"{second} and {first} take each other's corrections of tool 4 back" in alarm["text"]
-    assert "one asked for −14.0\u00a0µm, the other for +14.0\u00a0µm, 7 times in turn" in alarm["text"]
+    assert "one asked for −7.0\u00a0µm, the other for +7.0\u00a0µm, 7 times in turn" in alarm["text"]
     assert shop.tool(4)["paused_by"] is None, "correcting goes on"
     two.cut(2)
     assert len(two.alarms()) == 1, "it is said once"
-    shop.call("PATCH", f"/characteristics/{second}", parameters={"target": 40.014}, reason="as the drawing says")
+    shop.call("PATCH", f"/characteristics/{second}", parameters={"target": 40.007}, reason="as the drawing says")
     shop.acknowledge(alarm["id"], "noted")
     two.cut(8)
     assert two.alarms() == [], "what was before the answer no longer counts, and both are right now"

@@ -43,7 +43,7 @@ def sizes(count: int) -> list[float]:
     """Each asks for a correction, although all those before are counted in; in no order that looks like their effect."""
     rng, deviations = Random(7), [0.0]
     for _part in range(count):
-        deviations.append(rng.choice([each for each in (-0.0105, -0.0035, 0.0035, 0.0105) if each != deviations[-1]]))
+        deviations.append(rng.choice([each for each in (-0.0075, -0.0025, 0.0025, 0.0075) if each != deviations[-1]]))
     return [40 + each for each in deviations[1:]]
 
 
