@@ -401,8 +401,8 @@ def _tell(layout: "Layout", *, wide: bool = False) -> None:
         say(words.format(encoding=layout.encoding, text=layout.letters), style="yellow")
     if layout.ignored and not wide:
         say(_("Not used: {names}").format(names=", ".join(layout.ignored)))
-    if "measured_at" not in layout.columns:
-        say(_("There is no column of times: every reading gets the time of this import."), style="yellow")
+    if layout.on_times:
+        say(layout.on_times, style="yellow")
 
 
 @contextmanager

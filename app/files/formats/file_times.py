@@ -5,11 +5,12 @@ others, or one that programs write where they have none, is no time.
 """
 
 import re
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from datetime import date, datetime, time, timedelta
 from typing import NamedTuple
 from zoneinfo import ZoneInfo
 
+from app.core.number_text import plain
 from app.files.formats.cell_values import DayOrder, Slashed, Unreadable, moment, naive, slashed
 from app.language.i18n import _
 
@@ -21,6 +22,8 @@ DEFAULTS = frozenset(
 MIDNIGHTS = frozenset({date(2000, 1, 1)})
 """Days of which only the midnight is one: a clock that was never set begins there."""
 FAR = timedelta(days=366)
+YEARS = 1900, 2200  # between them is a date that may be one; a form of times without a year says 1900
+_DATE_AND_TIME = re.compile(r"\d{1,4}([-./])\s?\d{1,2}\1\s?\d{1,4}\.?[\sT,]+\d{1,2}:\d{2}")
 _ZEROS = re.compile(r"0{1,4}([./-])0{1,2}\1 ?0{1,4}\.?(?:[/ .,T]+0{1,2}(?::0{1,2}){1,2}(?:[.,]0+)?)?[/Zz]?")
 
 
@@ -113,6 +116,54 @@ def times_of(texts: Iterable[str], pattern: str | None = None, read: Read | None
         return FileTimes(_only(orders), absent=absent, nothing=not unread and absent >= defaults.keys())
     far = (day for day in DEFAULTS | MIDNIGHTS if not _within(day, min(days), max(days)))
     return FileTimes(_only(orders), dated=True, absent=frozenset(far))
+
+
+class Unnamed(NamedTuple):
+    """Columns that hold times, and whose names do not say so. sure: the one that is taken. doubtful: those of which a person says it."""
+
+    sure: str = ""
+    doubtful: tuple[str, ...] = ()
+
+
+def times_unnamed(columns: Mapping[str, Sequence[str]], pattern: str | None = None) -> Unnamed:
+    """The column among these that holds the times, by their names: the only one with dates and times, in every row.
+
+    Where there are more, or rows of it have none, or dates only, a person has to say. A column of one program's default is none.
+
+    >>> times_unnamed({"Stamp": ["18.11.2025 06:05", "18.11.2025 06:06"], "By": ["A", "B"]})
+    Unnamed(sure='Stamp', doubtful=())
+    >>> times_unnamed({"Stamp": ["18.11.2025 06:05", ""], "Day": ["18.11.2025", "18.11.2025"]})
+    Unnamed(sure='', doubtful=('Stamp',))
+    >>> times_unnamed({"Day": ["18.11.2025", "18.11.2025"], "No": ["4711-01-02", "4711-13-02"]}).doubtful
+    ('Day',)
+    """
+    moments: dict[str, int] = {}
+    days: list[str] = []
+    for name, cells in columns.items():
+        kinds = [_has_date(cell, pattern) for cell in cells]
+        if not any(kinds) or (times_of(cells, pattern).nothing and "unread" not in kinds):
+            continue
+        if 2 * (times := len([kind for kind in kinds if kind in {"time", "unread"}])) >= len(kinds):
+            moments[name] = times - len(kinds)
+        elif 2 * kinds.count("day") >= len(kinds):
+            days.append(name)
+    if list(moments.values()) == [0]:
+        return Unnamed(next(iter(moments)))
+    return Unnamed(doubtful=tuple(moments or days))
+
+
+def _has_date(cell: str, pattern: str | None) -> str:
+    """The part of a time that a cell holds: time, unread (a date in a form that nobody has named, and a time), day, or nothing."""
+    text = plain(cell)
+    if not text or text.isdigit() or is_zeros(text):
+        return ""
+    try:
+        at = naive(text, pattern, "month_first" if slashed(text) is Slashed.MONTH_FIRST else "day_first")
+    except Unreadable:
+        return "unread" if _DATE_AND_TIME.match(text) else ""
+    if not YEARS[0] < at.year < YEARS[1]:
+        return ""
+    return "time" if ":" in text or (pattern and "H" in pattern.upper()) else "day"
 
 
 def _only(orders: set[DayOrder]) -> DayOrder | None:

@@ -249,7 +249,7 @@ def _result(result: ColumnResult, layout: Layout, *, alone: bool) -> TableImport
     made = TableImportCharacteristic(name=name, characteristic=column.characteristic, created=created, notes=[])
     if summary is not None:
         made.stored, made.repeated, made.first_sequence = summary.stored, summary.repeated, summary.first_sequence
-        made.notes = summary.notes
+        made.notes = [*filter(None, [layout.on_times]), *summary.notes]
     if trouble is not None:
         made.trouble = " ".join([trouble.detail, *map(str, result.flaws[:20])])
     return made

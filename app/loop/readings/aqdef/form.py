@@ -20,8 +20,8 @@ from app.loop.readings.aqdef.matching import NEW, Content
 from app.loop.readings.aqdef.sorting import Wishes
 from app.loop.readings.importing.cells import Flaw
 from app.loop.readings.importing.history import Flawed
-from app.loop.readings.importing.layout import wrong
 from app.loop.readings.importing.preview import CHECKED_LINES, TRIED_WHOLE
+from app.loop.readings.importing.refusals import wrong
 from app.loop.readings.importing.uploads import Upload
 
 HOW = ("timezone", "unit", "dates", "encoding", "machine")

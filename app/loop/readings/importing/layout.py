@@ -2,26 +2,31 @@
 
 import json
 import sys
-from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import chain, islice
 from pathlib import Path
 from typing import Any, NamedTuple
 from zoneinfo import ZoneInfo
 
-from app.errors import FieldError, Invalid
 from app.files.formats import cell_values, delimited, parts_across, spreadsheet
 from app.files.formats.cell_values import slashed
 from app.files.formats.delimited import Row, Unusable
-from app.files.formats.file_times import FileTimes, times_of
+from app.files.formats.file_times import FileTimes, times_of, times_unnamed
 from app.files.formats.headings import TOP, as_wide, heading, is_reading, is_summary, others
-from app.files.formats.units import LENGTHS, UnknownUnit, length_unit, unit_above, unit_behind, unit_in
+from app.files.formats.units import LENGTHS, UnknownUnit, length_unit, unit_above, unit_behind
 from app.language.i18n import _
 from app.loop.readings.importing.columns import DRAWN, by_places, columns_of, fits, guesses_of, nominal_of
+from app.loop.readings.importing.refusals import (
+    LONGEST_NAME,
+    heading_or_reading,
+    long_name,
+    refuse_no_table,
+    refuse_wide,
+    unit_of,
+    wrong,
+)
 
-MOST_COLUMNS = 500
-LONGEST_NAME = 1_000
-"""Characters of a column's name, or a characteristic's: the page shows each a dozen times, and a cell may have 131,072."""
 NO_DIGIT = "*"
 MOST_NAMES = 1_000
 DIAMETERS = frozenset({"prumer", "priemer"})
@@ -73,7 +78,8 @@ class Layout:
         str | None, ...
     ] = ()  # of columns whose header says none: in a row below it, or in the lines above the table
     doubt: str = ""  # a unit that the lines above the table name, and do not say of what
-    question: tuple[str, str] | None = None  # what only a person can answer: the choice, and the sentence
+    questions: tuple[tuple[str, str], ...] = ()  # what only a person can answer: the choice, and the sentence
+    takes_times: bool = False  # of a column whose name does not say that it holds them
     thousands: Mapping[int, str] = field(default_factory=dict)  # a number whose sign may part thousands, by its column
     nominal: tuple[int, ...] = ()  # of the nominal size, which is one for all rows of a characteristic
     zone: ZoneInfo | None = None
@@ -135,8 +141,19 @@ class Layout:
 
     def refuse_question(self) -> None:
         """Refuse what only a person can answer, before anything is stored. Raises `Invalid`."""
-        if self.question:
-            raise wrong(*self.question)
+        for question in self.questions:
+            raise wrong(*question)
+
+    @property
+    def on_times(self) -> str:
+        """A sentence on times that are there under another name, or nowhere. Empty where a name or a person says them."""
+        if "measured_at" not in self.columns:
+            return _("There is no column of times: every reading gets the time of this import.")
+        words = _(
+            "No column is called as the time of measuring. {column} is taken for it: it alone holds dates and times, in every line. "
+            "If it is something else, say so (--map measured_at=)."
+        )
+        return words.format(column=self.named("measured_at")) if self.takes_times else ""
 
     def of_one(self, key: str, name: str) -> "Layout":
         """The layout for one characteristic: of a table with rows of several, its own rows. Raises `Invalid`."""
@@ -221,44 +238,6 @@ def refuse_incomplete(layout: Layout) -> None:
         )
 
 
-def wrong(where: str, message: str) -> Invalid:
-    """One thing that is wrong with the file or with what was said about it."""
-    return Invalid(f"{where}: {message}", _("Nothing was imported."), errors=[FieldError(where, message)])
-
-
-def unit_of(column: str, said: str | None) -> str | None:
-    """The unit of a column's numbers: what a person said, else what its header names. Raises `Invalid`."""
-    try:
-        return said or unit_in(column)
-    except UnknownUnit as error:
-        raise wrong(
-            "unit",
-            _(
-                "The header of the column {column} names the unit {unit}, which is not known as a length. "
-                "Say in which unit its numbers are: {units}."
-            ).format(column=column, unit=error.word, units=", ".join(LENGTHS)),
-        ) from None
-
-
-def _refuse_wide(header: Collection[str]) -> None:
-    """Refuse what is no table of readings, before each column is looked at and offered for choice."""
-    if len(header) > MOST_COLUMNS:
-        raise wrong(
-            "file",
-            _("The file has {columns} columns; at most {most} are taken. Is its first line the header?").format(
-                columns=len(header), most=MOST_COLUMNS
-            ),
-        )
-    for number, name in enumerate(header, 1):
-        if len(name) > LONGEST_NAME:
-            raise wrong("file", _("column {n}").format(n=number) + " " + _long_name(name))
-
-
-def _long_name(name: str) -> str:
-    words = _("has a name of {n} characters; at most {most} are taken. It begins: {name}")
-    return words.format(n=len(name), most=LONGEST_NAME, name=name[:40])
-
-
 def _csv_layout(path: Path, wishes: Wishes, zone: ZoneInfo | None, kind: str = "csv") -> Layout:
     encoding = wishes.encoding or delimited.encoding_of(path)
     delimiter = wishes.delimiter or delimited.delimiter_of(path, encoding)
@@ -266,7 +245,7 @@ def _csv_layout(path: Path, wishes: Wishes, zone: ZoneInfo | None, kind: str = "
     top = list(islice(rows, TOP))
     if not top:
         raise wrong("file", _("The file is empty."))
-    _refuse_no_table(top[0].cells[0])
+    refuse_no_table(top[0].cells[0])
     found = heading(top, wishes.header_line, ragged=kind == "sheet")
     if found is None:
         words = _("Line {n} is empty, or too far below to be the header of the columns.")
@@ -277,7 +256,7 @@ def _csv_layout(path: Path, wishes: Wishes, zone: ZoneInfo | None, kind: str = "
         fitting = (row.line for row in near if fits([cell.strip() for cell in row.cells], wishes.mapping))
         found = heading(top, next(fitting, None), ragged=kind == "sheet") or found
     head, header, units, end = found
-    _refuse_wide(header)
+    refuse_wide(header)
     first_line = max(head + 1, end + 1, wishes.first_line or 0)
     columns = columns_of(header, wishes.mapping)
     bare: bool | None = False
@@ -307,7 +286,7 @@ def _csv_layout(path: Path, wishes: Wishes, zone: ZoneInfo | None, kind: str = "
         said_unit=(unit_of(header[place], wishes.unit) or units[place]) if "measured" in columns else wishes.unit,
         units=units,
         doubt="" if wishes.unit or "unit" in columns else doubt,
-        question=_heading_or_reading(head, header) if bare is None else None,
+        questions=(heading_or_reading(head, header),) if bare is None else (),
         thousands={} if wishes.decimal and kind == "csv" else _thousands(below, range(len(header))[only], kind),
         nominal=nominal_of(header, columns, wishes.mapping),
         zone=zone,
@@ -326,15 +305,12 @@ def _csv_layout(path: Path, wishes: Wishes, zone: ZoneInfo | None, kind: str = "
     named = (
         (row.line, row.cells) for row in rows_of(path, made) if isinstance(row, Row) and tuple(row.cells) != header
     )
-    return replace(_timed(made, _times(made, below, rows)), drawn=_drawn(made, named))
-
-
-def _heading_or_reading(line: int, names: Sequence[str]) -> tuple[str, str]:
-    words = _(
-        "Line {n} ({cells}) may name the columns, or be a reading. Say which it is: the line of the column names (--header-line {n}), or "
-        "the first line of readings (--first-line {n})."
-    )
-    return "header_line", words.format(n=line, cells="; ".join(names)[:80])
+    last = wishes.last_line or sys.maxsize
+    cells = [row.cells for row in below if row.line <= last and tuple(row.cells) != header]
+    made = _with_unnamed(_timed(made, _times(made, below, rows)), wishes, cells)
+    if made.takes_times:
+        made = _timed(made, _times(made, below, rows))
+    return replace(made, drawn=_drawn(made, named))
 
 
 def _letters(rows: Iterable[Row]) -> str:
@@ -359,15 +335,6 @@ def _units_of(layout: Layout, rows: Sequence[Row]) -> set[str | None]:
     return units
 
 
-def _refuse_no_table(begin: str) -> None:
-    """Refuse what is no table by its first cell."""
-    if begin.startswith("K0100 "):
-        raise wrong("file", _("This is AQDEF (Q-DAS): import it under a name that ends with .dfq."))
-    for mark, kind in (("<?xml", "XML"), ("<html", "HTML"), ("<!doctype", "HTML"), ("%pdf", "PDF"), ("{\\rtf", "RTF")):
-        if begin.lower().startswith(mark):
-            raise wrong("file", _("This is {kind}, no table: export one as CSV or XLSX.").format(kind=kind))
-
-
 def _above(titles: Sequence[Sequence[str]]) -> tuple[str | None, str]:
     """The unit that the lines above a table say for all of it; or the one that they name without saying of what."""
     try:
@@ -380,6 +347,25 @@ def _timed(layout: Layout, times: FileTimes) -> Layout:
     """The layout with these times; a column that holds none is none of times."""
     columns = {name: places for name, places in layout.columns.items() if name != "measured_at" or not times.nothing}
     return replace(layout, times=times, columns=columns)
+
+
+def _with_unnamed(layout: Layout, wishes: Wishes, rows: Sequence[Sequence[Any]]) -> Layout:
+    """The layout with the column that alone holds times, or with the question which one does, where neither names nor a person say it."""
+    if "measured_at" in layout.columns or "measured_at" in wishes.mapping:
+        return layout
+    free = [place for place in layout.ignored_places if place not in layout.nominal]
+    columns = {str(at): [written(row[at]) if at < len(row) else "" for row in rows] for at in free}
+    sure, doubtful = times_unnamed(columns, wishes.time_format)
+    if sure:
+        return replace(layout, columns={**layout.columns, "measured_at": (int(sure),)}, takes_times=True)
+    if not doubtful:
+        return layout
+    words = _(
+        "Dates stand under {columns}, and no column is called as the time of measuring. Say which it is (measured_at=COLUMN), or that "
+        "none is (measured_at=): then every reading gets the time of the import."
+    )
+    names = ", ".join(layout.header[int(at)] or str(int(at) + 1) for at in doubtful)
+    return replace(layout, questions=(*layout.questions, ("measured_at", words.format(columns=names))))
 
 
 def _times(layout: Layout, begin: Sequence[Row], rest: Iterator[Row]) -> FileTimes:
@@ -420,7 +406,7 @@ def _drawn(layout: Layout, rows: Iterable[tuple[int, Sequence[Any]]]) -> dict[st
             where = layout.named("characteristic") + ", " + _("line {line}").format(line=line)
             raise wrong(where, words.format(name=repr(name)))
         if len(name) > LONGEST_NAME:
-            raise wrong(layout.named("characteristic") + ", " + _("line {line}").format(line=line), _long_name(name))
+            raise wrong(layout.named("characteristic") + ", " + _("line {line}").format(line=line), long_name(name))
         drawn = Drawn(line, nominal, upper, lower, natural, unit)
         first = found.setdefault(name, drawn)
         if not first.other and first[1:6] != drawn[1:6]:
@@ -459,7 +445,7 @@ def _json_layout(path: Path, wishes: Wishes, zone: ZoneInfo | None, *, is_list: 
     values = [value for _at, value in islice(_objects(path, is_list=is_list), 200)]
     for value in values:
         names.update(dict.fromkeys(map(str, value)))
-        _refuse_wide(names)
+        refuse_wide(names)
     header = tuple(names)
     if not header:
         raise wrong("file", _("The file holds no JSON objects."))
@@ -477,15 +463,22 @@ def _json_layout(path: Path, wishes: Wishes, zone: ZoneInfo | None, *, is_list: 
     if "characteristic" in columns:
         rows = ((at, [value.get(name) for name in header]) for at, value in _objects(path, is_list=is_list))
         layout = replace(layout, drawn=_drawn(layout, rows))
-    if "measured_at" not in columns:
-        return layout
+    if "measured_at" in columns:
+        times, dated = _times_of(values, layout)
+        if not dated:
+            times, dated = _times_of((value for _at, value in _objects(path, is_list=is_list)), layout)
+        layout = _timed(layout, times)
+    texts = [[text if isinstance(text := value.get(name), str) else "" for name in header] for value in values]
+    layout = _with_unnamed(layout, wishes, texts)
+    return _timed(layout, _times_of(values, layout)[0]) if layout.takes_times else layout
+
+
+def _times_of(values: Iterable[Mapping[str, Any]], layout: Layout) -> tuple[FileTimes, bool]:
+    """Common properties of the times of these objects, and if there are any, be it as numbers."""
     name = layout.named("measured_at")
     texts = [value.get(name) for value in values]
-    times = times_of((text for text in texts if isinstance(text, str)), wishes.time_format)
-    if not times.dated and not any(isinstance(text, int | float) for text in texts):
-        texts = [value.get(name) for _at, value in _objects(path, is_list=is_list)]
-        times = times_of((text for text in texts if isinstance(text, str)), wishes.time_format)
-    return _timed(layout, times)
+    times = times_of((text for text in texts if isinstance(text, str)), layout.time_format)
+    return times, times.dated or any(isinstance(text, int | float) for text in texts)
 
 
 def _objects(path: Path, *, is_list: bool) -> Iterator[tuple[int, dict[str, Any]]]:

@@ -12,7 +12,8 @@ from app.files.apart import PREFIX, apart, spend
 from app.files.formats.delimited import Unusable
 from app.language.i18n import _
 from app.loop.readings.importing.cells import Flaw, Looked, Passed, fingerprint, items, looked, put_down, shown, taken
-from app.loop.readings.importing.layout import Layout, Wishes, wrong
+from app.loop.readings.importing.layout import Layout, Wishes
+from app.loop.readings.importing.refusals import wrong
 from app.loop.readings.origin import Origin, guid_of
 from app.loop.readings.schemas import ReadingIn, reading_of
 

@@ -35,6 +35,8 @@ from app.web.limits import MEGABYTE, takes
 from app.web.paging import address
 from app.web.templates import page
 
+AUTOMATIC = "?"
+"""The choice of a column where nobody has chosen one and none is found."""
 router = APIRouter(include_in_schema=False)
 Token = Annotated[str, Path(max_length=64)]
 HOW = (
@@ -263,7 +265,7 @@ def _page(
         layout=layout,
         trouble=trouble,
         said={name: said.get(name, "") for name in HOW},
-        fields=_fields(layout, wide=to is None) if layout else [],
+        fields=_fields(layout, _wishes(said).mapping, wide=to is None) if layout else [],
         sheets=[(name, name) for name in upload.sheets],
         encodings=_encodings(),
         samples=delimited.samples(upload.path) if layout is None else [],
@@ -278,7 +280,7 @@ def _encodings() -> list[tuple[str, str]]:
 
 def _wishes(said: Mapping[str, str]) -> Wishes:
     return Wishes(
-        mapping={name: said[f"column_{name}"] for name in NAMES if f"column_{name}" in said},
+        mapping={name: said[f"column_{name}"] for name in NAMES if said.get(f"column_{name}", AUTOMATIC) != AUTOMATIC},
         delimiter=SIGNS.get(said.get("delimiter", "")),
         decimal={"comma": ",", "point": "."}.get(said.get("decimal", "")),
         unit=said.get("unit") or None,
@@ -297,8 +299,12 @@ def _line(text: str) -> int | None:
     return int(text) if text.isascii() and text.isdigit() and len(text) < 7 else None
 
 
-def _fields(layout: Layout, *, wide: bool = False) -> list[dict[str, Any]]:
-    """Each field that a column can be, with the columns to choose from and the one that it is."""
+def _fields(layout: Layout, chosen: Mapping[str, str], *, wide: bool = False) -> list[dict[str, Any]]:
+    """Each field that a column can be, with the columns to choose from and the one that it is. chosen: columns by person, by field.
+
+    Where nothing is found and nobody has chosen, it is looked for again when the line of the heading is another; of times that are
+    in doubt a person says that there are none.
+    """
     labels = {
         "measured": _("Measured value"),
         "measured_at": _("Time of measuring"),
@@ -322,9 +328,15 @@ def _fields(layout: Layout, *, wide: bool = False) -> list[dict[str, Any]]:
         places = layout.columns.get(name, ())
         value = "+".join(str(place + 1) for place in places)
         pair = [(value, layout.named(name))] if len(places) > 1 else []
-        fields.append(
-            {"name": f"column_{name}", "label": label, "value": value, "options": [("", "–"), *pair, *columns]}
-        )
+        none, free = [("", "–")], columns
+        if not value and name not in chosen:
+            value = AUTOMATIC
+            none = [(AUTOMATIC, "–"), *([("", _("none"))] if name in dict(layout.questions) else [])]
+        elif layout.takes_times and name == "measured_at":
+            free = [(AUTOMATIC if at == value else at, shown) for at, shown in columns]
+            value = AUTOMATIC
+        options = [*none, *pair, *free]
+        fields.append({"name": f"column_{name}", "label": label, "value": value, "options": options})
     return fields
 
 

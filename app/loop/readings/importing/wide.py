@@ -21,8 +21,9 @@ from app.loop.readings.importing import drawn
 from app.loop.readings.importing.cells import MOST_FLAWS, Flaw
 from app.loop.readings.importing.columns import ORIGIN
 from app.loop.readings.importing.history import Flawed, Progress, Summary, store_history
-from app.loop.readings.importing.layout import Layout, unit_of
+from app.loop.readings.importing.layout import Layout
 from app.loop.readings.importing.lines import Read, lines, read_apart, read_here
+from app.loop.readings.importing.refusals import unit_of
 from app.loop.readings.records import Entry
 
 

@@ -68,8 +68,12 @@ def test_what_a_column_means_can_be_changed(at_desk: Page, shop: Shop, tmp_path:
     send(at_desk, shop, file)
     expect(at_desk.locator(".note")).to_contain_text("No column is recognised")
     at_desk.select_option("select[name=column_measured]", label="b")
-    expect(at_desk.locator(".sheet th small")).to_have_text(["Measured value"])
+    expect(at_desk.locator(".sheet th small")).to_have_text(["Measured value", "Time of measuring"])
+    expect(at_desk.locator(".note")).to_contain_text("c is taken for it")
     at_desk.wait_for_load_state()  # the script that sends what is changed
+    at_desk.select_option("#f-column_measured_at", label="–")
+    expect(at_desk.locator(".sheet th small")).to_have_text(["Measured value"])
+    at_desk.wait_for_load_state()
     at_desk.select_option("#f-column_measured_at", label="c")
     expect(at_desk.locator(".sheet th small")).to_have_count(2)
     at_desk.get_by_role("button", name="Import all").click()

@@ -17,8 +17,9 @@ from app.files.formats.spreadsheet import text_of
 from app.loop.readings.aqdef.matching import parameters_of
 from app.loop.readings.importing.cells import Flaw, Passed
 from app.loop.readings.importing.drawn import contents
-from app.loop.readings.importing.layout import MOST_COLUMNS, NO_DIGIT, Wishes, look
+from app.loop.readings.importing.layout import NO_DIGIT, Wishes, look
 from app.loop.readings.importing.lines import Line, lines
+from app.loop.readings.importing.refusals import MOST_COLUMNS
 
 NOW = datetime(2026, 11, 21, 12, tzinfo=UTC)
 
