@@ -141,6 +141,8 @@ def _evenest(lines: Sequence[str]) -> str | None:
     for first in range(len(lines)):  # titles above the table have none of them
         evenness = {sign: min(line.count(sign) for line in lines[first:]) for sign in DELIMITERS}
         best = max(DELIMITERS, key=lambda sign: evenness[sign])
+        if best == "," and not any(map(_COMMA_OF_CELLS.search, lines[first:])):
+            best = next((sign for sign in _BESIDE_COMMAS if evenness[sign]), best)
         if evenness[best]:
             return best
     return None
@@ -311,6 +313,9 @@ def decimal_of(cells: Iterable[str]) -> str:
     return "," if commas > points else "."
 
 
+_COMMA_OF_CELLS = re.compile(r"(?<!\d),|,(?!\d)")
+_BESIDE_COMMAS = (";", "\t", "|")
+"""Delimiters of lines in which all commas are of numbers."""
 _LIKE_THOUSANDS = re.compile(r"[+\-\N{MINUS SIGN}]?[1-9]\d{0,2}[.,]\d{3}")
 
 

@@ -20,6 +20,7 @@ BARE: list[tuple[str, dict[str, str], list[float]]] = [
     ("P1;40;18.11.2025 06:05\nP2;41;18.11.2025 06:06\n", {"measured": "2", "measured_at": "3"}, [40.0, 41.0]),
     ("18.11.2025;06:05;40\n18.11.2025;06:06;41\n", {"measured": "3", "measured_at": "1+2"}, [40.0, 41.0]),
     ("3;40\n4;40\n3;40\n", {"measured": "2", "part": "1"}, [40.0, 40.0, 40.0]),
+    ("40,01;16,01\n40,02;16,02\n", {"measured": "1"}, [40.01, 40.02]),
     ("P1;40,001\nP2;40\n", {"measured": "2"}, [40.001, 40.0]),
 ]
 NAMED: list[tuple[str, dict[str, str], list[float]]] = [
