@@ -3,6 +3,7 @@
 import json
 import sys
 from collections.abc import Iterable, Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -14,6 +15,8 @@ from app.cli.data import (
     Delimiter,
     Encoding,
     File,
+    FirstLine,
+    HeaderLine,
     Mapping,
     TimeFormat,
     UnitOption,
@@ -59,6 +62,8 @@ def replay_file(
     timezone: Zone = None,
     time_format: TimeFormat = None,
     encoding: Encoding = None,
+    header_line: HeaderLine = None,
+    first_line: FirstLine = None,
     as_json: Annotated[
         bool, typer.Option("--json", envvar="INBAND_JSON", help="One JSON object per line, as when piped.")
     ] = False,
@@ -76,7 +81,7 @@ def replay_file(
     flaws: list[Flaw] = []
     with readable(file) as path:
         wishes = wishes_of(mapping, delimiter, decimal, unit, timezone, time_format, encoding)
-        layout = look(path, wishes, file.name)
+        layout = look(path, replace(wishes, header_line=header_line, first_line=first_line), file.name)
         good = _aside(replay(rules, lines(path, layout, "replay"), "replay"), flaws)
         if as_json or not sys.stdout.isatty():
             for decision in good:

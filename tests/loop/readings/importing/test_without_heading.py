@@ -1,11 +1,13 @@
 """Tables without a heading, and those whose columns have numbers for names: no reading is lost, and what may be either is asked."""
 
+import json
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 import pytest
 
+from app.cli.replay import replay_file
 from app.errors import Invalid
 from app.loop.readings.importing.layout import Wishes, look
 from app.loop.readings.importing.lines import Line, lines
@@ -88,3 +90,15 @@ def test_a_doubtful_heading_is_asked_at_each_door(plant: Plant, tmp_path: Path) 
     assert plant.stored(key) == []
     assert plant.page(path, to_2=key, first_line="1") == ""
     assert [size for size, _at in plant.stored(key)] == [40.001, 40.002]
+
+
+def test_a_doubtful_heading_is_answered_when_readings_are_replayed(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path, rules = tmp_path / "a.csv", tmp_path / "p.json"
+    path.write_text("40\n40,01\n")
+    rules.write_text(json.dumps(D40 | {"zero_range": 0.001, "wear_limit": 0.5, "confidence_limit": 1.0}))
+    with pytest.raises(Invalid, match=ASKED):
+        replay_file(path, rules, mapping="measured=1", as_json=True)
+    replay_file(path, rules, mapping="measured=1", as_json=True, first_line=1)
+    assert len(capsys.readouterr().out.splitlines()) == 2
