@@ -33,6 +33,7 @@ from app.bridge.file_rows import (
     reasons,
     unit_in_doubt,
     units_of,
+    unnamed_times,
 )
 from app.bridge.file_settings import Settings
 from app.bridge.links import Received
@@ -214,8 +215,12 @@ class _Reader:
         self._table(csv_rows(self.path, table), units_of(self.path, table))
 
     def _table(self, rows: Iterator[tuple[int, Found]], unit: Callable[[str], str | None] = unit_in) -> None:
-        columns = self.settings.columns or {name: name for name in FIELDS}
+        columns = dict(self.settings.columns) or {name: name for name in FIELDS}
         table = list(rows)
+        if "measured_at" not in self.settings.columns:
+            unnamed = unnamed_times(columns, table, self.settings.times)
+            columns |= unnamed.column
+            table += unnamed.said
         column = columns.get("measured_at", "")
         written = (str(cell_of(row, column) or "") for _line, row in table if isinstance(row, Mapping))
         self.form = self.form._replace(together=times_of(written, self.settings.times).live)

@@ -6,11 +6,14 @@ from itertools import chain, islice
 from pathlib import Path
 from typing import Any, NamedTuple
 
+from app.bridge.fields import EVERY, FIELDS
 from app.bridge.json_text import read_json
+from app.core.number_text import number_or_none
 from app.files.formats import delimited
-from app.files.formats.headings import TOP, Heading, as_wide, heading, is_labelled, others
+from app.files.formats.file_times import times_unnamed
+from app.files.formats.headings import TOP, Heading, as_wide, heading, is_labelled, is_reading, others
 from app.files.formats.repeats import Remark, Repeats
-from app.files.formats.units import LENGTHS, is_unit_column, unit_above, unit_in
+from app.files.formats.units import LENGTHS, is_unit_column, unit_above, unit_behind, unit_in
 
 
 class Fault(NamedTuple):
@@ -68,7 +71,11 @@ def csv_rows(path: Path, table: Table) -> Iterator[tuple[int, Found]]:
         top = list(islice(rows, TOP))
         if not top:
             return
-        line, names, _units, end = _heading(top, table)
+        found = _heading(top, table)
+        if reason := _in_doubt(found, top, table):
+            yield found.line, Fault(found.line, "", reason)
+            return
+        line, names, _units, end = found
         used = {part for column in table.columns for part in parts_of(column, names)}
         counted = {name for name in names if name in used or name in table.names or is_unit_column(name)}
         for name in sorted(name for name in counted if names.count(name) > 1):
@@ -82,7 +89,7 @@ def csv_rows(path: Path, table: Table) -> Iterator[tuple[int, Found]]:
         for row in _as_wide(below, len(names), delimiter, table):
             if isinstance(row, delimited.Unusable):
                 yield row.line or 0, Fault(row.line, "", str(row))
-            elif tuple(cell.strip() for cell in row.cells) == names:
+            elif line and tuple(cell.strip() for cell in row.cells) == names:
                 yield row.line, Remark(row.line, "", "", "is the heading again; passed over")
             else:
                 yield row.line, dict(zip(names, row.cells, strict=False))
@@ -101,6 +108,31 @@ def units_of(path: Path, table: Table) -> Callable[[str], str | None]:
     titles = [row.cells for row in top if row.line < line]
     below = dict(zip(names, units, strict=False))
     return lambda column: unit_in(column) or below.get(column) or unit_above(titles)
+
+
+class UnnamedTimes(NamedTuple):
+    """The column of times that the configuration does not name, if there is one, and what is said of it, by line."""
+
+    column: dict[str, str]
+    said: list[tuple[int, Found]]
+
+
+def unnamed_times(columns: Mapping[str, str], table: Sequence[tuple[int, Found]], pattern: str | None) -> UnnamedTimes:
+    """The only column that holds times, where `columns` names none that is there; a fault where several may be it."""
+    rows = [row for _line, row in table if isinstance(row, Mapping)]
+    if any(has(row, columns.get("measured_at", "")) for row in rows):
+        return UnnamedTimes({}, [])
+    names = dict.fromkeys(name for row in rows for name in row if name)
+    used = {part for column in columns.values() for part in parts_of(column, names)}
+    cells = {name: [str(row.get(name) or "") for row in rows] for name in names if name not in used}
+    sure, doubtful = times_unnamed(cells, pattern)
+    if doubtful:
+        reason = "hold dates, and columns.measured_at names none of them: name the one that is meant, or none, which means now"
+        fault = Fault(None, ", ".join(doubtful), f'{reason}: columns.measured_at = "{doubtful[0]}", or "".')
+        return UnnamedTimes({}, [(0, fault)])
+    words = 'holds dates and times and is taken for the time of measuring; if it is not, set columns.measured_at = ""'
+    said: Found = Remark(table[0][0] if table else 0, sure, "", words)
+    return UnnamedTimes({"measured_at": sure}, [(0, said)]) if sure else UnnamedTimes({}, [])
 
 
 def unit_in_doubt(word: str) -> str:
@@ -144,12 +176,55 @@ def has(row: Mapping[str, Any], column: str) -> bool:
 
 
 def _heading(top: Sequence[delimited.Row], table: Table) -> Heading:
-    """The names of the columns: where an import finds them; else in the first row that has all that are wanted."""
+    """The names of the columns: where an import finds them; else in the first row that has all that are wanted.
+
+    Of a table without a heading, whose columns are wanted by their places, these are the names, and the line is 0.
+    """
     found = heading(top, ragged=table.sheet) or Heading(top[0].line, ())
     near = others(top, found, named=True)
     plain = [Heading(row.line, tuple(cell.strip().lstrip("\ufeff") for cell in row.cells)) for row in near]
+    if (wanted := _wanted(table)) and all(map(str.isdigit, wanted)):
+        bare = is_reading(found, top)
+        if bare or (bare is None and not _has_all(found.names, table.columns)):
+            return Heading(0, tuple(str(at) for at in range(1, len(found.names) + 1)))
     fitting = (each for each in [found, *plain] if _has_all(each.names, table.columns))
     return next(fitting, plain[0])
+
+
+def _in_doubt(found: Heading, top: Sequence[delimited.Row], table: Table) -> str:
+    """The reason against a line of numbers as the heading: it is a reading, or may be one. Empty where there is no doubt."""
+    wanted = _wanted(table)
+    if not found.line or found.line != top[0].line:
+        return ""
+    bare = is_reading(found, top)
+    if bare is None and wanted and all(map(str.isdigit, wanted)):
+        return (
+            "may name the columns, or be a reading, as the columns are wanted by numbers: let the program write names that are words, "
+            "or no heading and decimals in each size."
+        )
+    if not bare or (wanted & {*found.names}):
+        return ""
+    cells = ", ".join(f'"{at}" ({name})' for at, name in enumerate(found.names, 1) if name)
+    return (
+        f"holds values, so the table has no heading: name its columns by their places, here {cells}, such as "
+        f'columns.measured = "{_place_of_a_size(found.names)}", with characteristics."*" for one that no column names.'
+    )
+
+
+def _place_of_a_size(cells: Sequence[str]) -> int:
+    """The place of the first size with decimals; else of the first cell that is a number."""
+    numbers = [
+        (text.isdigit(), at)
+        for at, cell in enumerate(cells, 1)
+        if number_or_none(text := unit_behind(cell)[0]) is not None
+    ]
+    return min(numbers, default=(False, 1))[1]
+
+
+def _wanted(table: Table) -> set[str]:
+    """The columns that are named: those of fields, else characteristics."""
+    columns = {part.strip() for column in table.columns for part in column.split("+")}
+    return columns or {name for name in table.names if name not in {*FIELDS, EVERY}}
 
 
 def _has_all(names: Sequence[str], columns: Collection[str]) -> bool:
