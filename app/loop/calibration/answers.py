@@ -195,7 +195,7 @@ class SuggestionOut(BaseModel):
     empirical_value: Annotated[float, Field(description="The one in effect.")]
     suggested: Annotated[
         float | None,
-        Field(description="None while pairs are missing, when they agree with the one in effect, or are all the same."),
+        Field(description="null while pairs are missing, when they agree with the one in effect, or are all the same."),
     ]
     pairs: Annotated[int, Field(description="Pairs that count.")]
     missing: Annotated[int, Field(description="How many more a suggestion needs.")]

@@ -57,12 +57,12 @@ class SwitchedOut(BaseModel):
 class LifeOut(BaseModel):
     """One edge, from the tool change that brought it in to the one that took it out."""
 
-    began_at: Annotated[datetime | None, Field(description="None if nobody recorded how it came in.")]
-    ended_at: Annotated[datetime | None, Field(description="None while it is in.")]
+    began_at: Annotated[datetime | None, Field(description="null if nobody recorded how it came in.")]
+    ended_at: Annotated[datetime | None, Field(description="null while it is in.")]
     seconds: Annotated[float | None, Field(description="How long it was in, or has been so far.")]
     parts: Annotated[int, Field(description="Parts cut with it.")]
     total: Annotated[
-        float | None, Field(description="Sum of the corrections while it was in, mm; None if not on record.")
+        float | None, Field(description="Sum of the corrections while it was in, mm; null if not on record.")
     ]
     edge: Annotated[str | None, Field(description="The cutting edge: D number or name.")]
     name: str | None

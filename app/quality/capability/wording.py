@@ -1,5 +1,7 @@
 """The words of capability: verdicts, tests, models in time, and which index may be quoted."""
 
+from math import isnan
+
 from app.core.natural import NaturalLimit
 from app.core.spc.capability import CAPABLE, VERY_CAPABLE, Caution, Index
 from app.core.spc.fitting import Fitted
@@ -303,6 +305,8 @@ def model_tests(in_time: InTime) -> list[tuple[str, str, str, str]]:
         return _("yes") if said else _("no")
 
     def f(test: Test) -> str:
+        if isnan(test.statistic):
+            return _("no scatter to compare")
         return f"F({test.freedom}, {test.freedom_error}) = {test.statistic:.2f}, {p_value(test.p_value)}"
 
     return [
@@ -316,7 +320,9 @@ def model_tests(in_time: InTime) -> list[tuple[str, str, str, str]]:
         (
             _("Do the means follow each other?"),
             _("von Neumann's ratio"),
-            f"C = {index(in_time.successive.statistic)}, {p_value(in_time.successive.p_value)}",
+            f"C = {index(in_time.successive.statistic)}, {p_value(in_time.successive.p_value)}"
+            if not isnan(in_time.successive.statistic)
+            else _("no scatter to compare"),
             answer(in_time.successive.significant),
         ),
         (

@@ -158,6 +158,8 @@ def _flat(values: dict[str, Any], prefix: str = "") -> dict[str, Any]:
 def _said(value: Any, field: Field | None = None) -> str:
     """A value as people read it: what is in a list is reported, not written as JSON.
 
+    >>> _said([]), _said({"after": 0, "groups": [], "receivers": [1]})
+    ('–', 'after 0, receivers 1')
     >>> _said(True), _said(0.1 + 0.2), _said(["a", 2]), _said("9f86d081884c7d659a2feaa0c55ad015a3bf4f1b2b0b822cd15d6c15b0f00a08")
     ('yes', '0.3', 'a, 2', '9f86d081884c…')
     """
@@ -172,7 +174,7 @@ def _said(value: Any, field: Field | None = None) -> str:
         if MOMENT.fullmatch(value):
             return as_read(datetime.fromisoformat(value))
         return f"{value[:12]}…" if DIGEST.fullmatch(value) else value
-    if isinstance(value, list):
+    if isinstance(value, list) and value:
         sets = any(isinstance(item, dict) for item in value)
         return ("; " if sets else ", ").join(map(_said, value))
     if isinstance(value, dict):
@@ -180,7 +182,7 @@ def _said(value: Any, field: Field | None = None) -> str:
         values = [
             f"{name.replace('_', ' ')} {_said(item)}"
             for name, item in value.items()
-            if name != "code" and item is not None
+            if name != "code" and item not in (None, "", [])
         ]
         return f"{value['code'].replace('_', ' ')}: {', '.join(values)}" if "code" in value else ", ".join(values)
     return "–"

@@ -146,6 +146,6 @@ def _days_off(request: Request, caller: Caller, form: Mapping[str, str], error: 
         form=form,
         errors=errors,
         wrong_days=next((text for field, text in errors.items() if field.startswith("days")), None),
-        countries=[("", _("None"))] + [(code, calendar_queries.country_name(code)) for code in known],
+        countries=[("", _("No country"))] + [(code, calendar_queries.country_name(code)) for code in known],
         parts=sorted(known.get(form.get("country", ""), ())),
     )
