@@ -150,8 +150,8 @@ class Layout:
         if "measured_at" not in self.columns:
             return _("There is no column of times: every reading gets the time of this import.")
         words = _(
-            "No column is called as the time of measuring. {column} is taken for it: it alone holds dates and times, in every line. "
-            "If it is something else, say so (--map measured_at=)."
+            "No column has a known name for the time of measuring. {column} is taken for it: it alone has a date and a time in every line. "
+            "If it is something else, leave it out (--map measured_at=)."
         )
         return words.format(column=self.named("measured_at")) if self.takes_times else ""
 
@@ -361,8 +361,8 @@ def _with_unnamed(layout: Layout, wishes: Wishes, rows: Sequence[Sequence[Any]])
     if not doubtful:
         return layout
     words = _(
-        "Dates stand under {columns}, and no column is called as the time of measuring. Say which it is (measured_at=COLUMN), or that "
-        "none is (measured_at=): then every reading gets the time of the import."
+        "Dates stand under {columns}, and no column has a known name for the time of measuring. Say which it is (measured_at=COLUMN), or "
+        "that none is (measured_at=); then every reading gets the time of the import."
     )
     names = ", ".join(layout.header[int(at)] or str(int(at) + 1) for at in doubtful)
     return replace(layout, questions=(*layout.questions, ("measured_at", words.format(columns=names))))
