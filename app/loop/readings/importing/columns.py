@@ -33,7 +33,7 @@ _OF_FRENCH = frozenset(
 """Beside one of these a column *Nom* is that of names, not of nominal sizes."""
 AXES = frozenset({"axis", "ax", "achse", "osa", "os", "оса", "ось"})
 TIMES = frozenset(map(key_of, (
-    "time", "zeit", "uhrzeit", "vreme", "cas", "време", "время", "vrijeme", "heure", "ora", "hora", "godzina", "czas", "idő", "időpont",
+    "time", "zeit", "uhrzeit", "uhr", "vreme", "cas", "време", "время", "vrijeme", "heure", "ora", "hora", "godzina", "czas", "idő", "időpont",
     "tijd", "tid", "saat", "時刻", "時間", "时间", "시간", "messzeit", "time of day", "clock",
 )))  # fmt: skip
 _TOLERANCES = frozenset(map(key_of, (

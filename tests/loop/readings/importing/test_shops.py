@@ -29,6 +29,7 @@ FILES: dict[str, tuple[str, str, Found]] = {
         "Datum;Naměřená hodnota [µm];Poznámka\n18.11.2025 6:05;2,5;přesný\n18.11.2025 6:06;3,5;říz\n",
         at(0.0025, 0.0035),
     ),
+    "German, the clock in a column of its own": ("utf-8", "Datum;Uhr;Wert\n18.11.2025;06:05;40,001\n", at(40.001)),
     "Hungarian, dots behind the day": (
         "cp1250",
         "Dátum;Idő;Alkatrész;Mért érték\n2025.11.18.;6:05:00;A1;40,001\n2025.11.18.;6:06:00;A2;40,002\n",
