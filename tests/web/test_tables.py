@@ -60,7 +60,7 @@ def test_cards_of_a_phone_name_their_columns_and_sort_where_they_are_seen(
     rows = page.locator("#machines tbody tr")
     sort_by = page.get_by_label("Sort by").first
     chosen = "choice => choice.selectedOptions[0].text"
-    assert sort_by.evaluate(chosen) == "as listed"
+    assert sort_by.evaluate(chosen) == "usual order"
     sort_by.select_option("Name ▾")
     expect(rows.first).to_contain_text("Mill 10")
     sort_by.select_option("Name ▴")
@@ -69,7 +69,7 @@ def test_cards_of_a_phone_name_their_columns_and_sort_where_they_are_seen(
     page.keyboard.press("Tab")
     assert page.evaluate("document.activeElement.closest('tbody') !== null"), "no head that nobody sees is between"
     page.goto("/setup/characteristics?q=ring")
-    page.locator("summary", has_text="Sort by as listed").click()
+    page.locator("summary", has_text="Sort by usual order").click()
     page.locator(".sort-by").get_by_role("link", name="Characteristic").click()
     expect(page.locator(".sort-by [aria-current]")).to_have_count(1)
     expect(page.locator(".sort-by summary")).to_have_text("Sort by Characteristic ▴")
