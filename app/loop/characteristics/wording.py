@@ -388,7 +388,9 @@ def _not_a_number(problem: Problem, name: str) -> str:
         ).format(name=name)
     if problem.field in BY_NAME and BY_NAME[problem.field].kind is FieldKind.WHOLE:
         return _("{name} must be a whole number, in JSON without quotation marks").format(name=name)
-    return _("{name} must be a finite number, in mm with a decimal point where it is a length").format(name=name)
+    if problem.field in BY_NAME and BY_NAME[problem.field].kind is FieldKind.LENGTH:
+        return _("{name} must be a number, in mm with a decimal point").format(name=name)
+    return _("{name} must be a number, with a decimal point").format(name=name)
 
 
 def order_sentence(inner: str, outer: str, smaller: str, larger: str) -> str:
