@@ -23,6 +23,8 @@ MIDNIGHTS = frozenset({date(2000, 1, 1)})
 """Days of which only the midnight is one: a clock that was never set begins there."""
 FAR = timedelta(days=366)
 YEARS = 1900, 2200  # between them is a date that may be one; a form of times without a year says 1900
+_LIKE_A_DATE = re.compile(r"\d[-./]\s?\d{1,2}[-./]|[^\W\d_]{3}|\dT\d")
+"""In every text that may be a date. Of a wide sheet each cell is looked at."""
 _DATE_AND_TIME = re.compile(r"\d{1,4}([-./])\s?\d{1,2}\1\s?\d{1,4}\.?[\sT,]+\d{1,2}:\d{2}")
 _ZEROS = re.compile(r"0{1,4}([./-])0{1,2}\1 ?0{1,4}\.?(?:[/ .,T]+0{1,2}(?::0{1,2}){1,2}(?:[.,]0+)?)?[/Zz]?")
 
@@ -134,6 +136,8 @@ def times_unnamed(columns: Mapping[str, Sequence[str]], pattern: str | None = No
     Unnamed(sure='Stamp', doubtful=())
     >>> times_unnamed({"Stamp": ["18.11.2025 06:05", ""], "Day": ["18.11.2025", "18.11.2025"]})
     Unnamed(sure='', doubtful=('Stamp',))
+    >>> times_unnamed({"Stamp": ["20251118T060500"], "Size": ["40.001"]}).sure
+    'Stamp'
     >>> times_unnamed({"Day": ["18.11.2025", "18.11.2025"], "No": ["4711-01-02", "4711-13-02"]}).doubtful
     ('Day',)
     """
@@ -155,7 +159,7 @@ def times_unnamed(columns: Mapping[str, Sequence[str]], pattern: str | None = No
 def _has_date(cell: str, pattern: str | None) -> str:
     """The part of a time that a cell holds: time, unread (a date in a form that nobody has named, and a time), day, or nothing."""
     text = plain(cell)
-    if not text or text.isdigit() or is_zeros(text):
+    if (not pattern and not _LIKE_A_DATE.search(text)) or text.isdigit() or is_zeros(text):
         return ""
     try:
         at = naive(text, pattern, "month_first" if slashed(text) is Slashed.MONTH_FIRST else "day_first")
@@ -163,7 +167,7 @@ def _has_date(cell: str, pattern: str | None) -> str:
         return "unread" if _DATE_AND_TIME.match(text) else ""
     if not YEARS[0] < at.year < YEARS[1]:
         return ""
-    return "time" if ":" in text or (pattern and "H" in pattern.upper()) else "day"
+    return "time" if re.search(r":|\dT\d", text) or (pattern and "H" in pattern.upper()) else "day"
 
 
 def _only(orders: set[DayOrder]) -> DayOrder | None:
