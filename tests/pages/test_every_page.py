@@ -162,9 +162,7 @@ def test_a_page_is_in_order(
     assert (said, headings, high, wide, pale, axe, small) == ([], 1, 0, {}, [], {}, {}), page.url
 
 
-@pytest.mark.parametrize(
-    "address", [address if address in USUAL else pytest.param(address, marks=pytest.mark.long) for address in ADDRESSES]
-)
+@pytest.mark.parametrize("address", ADDRESSES)
 def test_the_words_of_a_page_are_in_order(house: Shop, admin: Person, values: dict[str, Any], address: str) -> None:
     assert flaws_in(admin.open(address.format(**values))) == []
 
@@ -175,6 +173,7 @@ def test_the_words_of_a_page_are_in_order(house: Shop, admin: Person, values: di
         ("<p>Sent <b>twice</b> .</p><p>Cut&nbsp; short</p>", ["blank before a mark", "two blanks"]),
         ("<p>8.3…10.3 µm ( all)</p>", ["blank after a bracket", "range of dots"]),
         ("<td>12.5 mm</td><td class=num>12.5 mm</td><td>12.5&nbsp;mm</td>", ["number broken from its unit"]),
+        ("<p>p = &lt; 0.001, ± +3</p>", ["two signs"] * 2),
         ("<td>None</td><p>F = nan, 3 to {high}</p><p>None was missed.</p>", ["word of the program"] * 3),
         ("<p><a>Done.</a><b>More</b> 3mm</p>", ["words without a blank", "number without a blank"]),
         ("<p>0, 1 … 20;\n  a <code>b  ;</code>, c</p><i title='{}'></i>", ["word of the program"]),

@@ -39,6 +39,7 @@ FLAWS = {
         r"(?:[a-z0-9,;=(\[] ?)None\b|\bNone(?=[ \xa0]?(?:µm|mm|[)\]]))"  # a sentence may begin with it
     ),
     "range of dots": re.compile(rf"(?<![\d.,])(?<!, )\d[\d.,]*(?:[ \xa0]?{UNIT})?[ \xa0]?…[ \xa0]?[+−-]?\d"),
+    "two signs": re.compile(r"= ?[<>≤≥=]|±[ \xa0]?[+−-]|[+−][+−-]\d"),
     "number without a blank": re.compile(r"\d(?:µm|mm|ppm)\b"),
 }
 BREAKS = re.compile(rf"[+−±<>≤≥]?\d[\d.,]* {UNIT}")
