@@ -176,13 +176,15 @@ def history(dsn: str, characteristic: str) -> list[dict[str, Any]]:
 def replay(parameters: Parameters, stored: Iterable[dict[str, Any]]) -> list[tuple[dict[str, Any], Decision]]:
     """Decide each reading again, one after the other, by `app.core` and the plainest bookkeeping there is.
 
-    For a characteristic that has its tool and its average to itself; whether it was paused is as stored. A part is cut with the
-    corrections up to its `correction_in_effect`, or with none that is not confirmed.
+    For a characteristic that has its tool and its average to itself; whether it was paused, and that corrections fell with it, is as
+    stored. A part is cut with the corrections up to its `correction_in_effect`, or with none that is not confirmed.
     """
     average = 0.0
     issued: dict[int, float] = {}
     confirmed: set[int] = set()
     decided = []
+    stored = list(stored)
+    fell = {reading["correction"] for reading in stored if reading["status"] == "superseded"}
     for reading in stored:
         in_effect = reading["correction_in_effect"]
         if in_effect is None:
@@ -199,6 +201,8 @@ def replay(parameters: Parameters, stored: Iterable[dict[str, Any]]) -> list[tup
         average = decision.average_after
         if decision.amount is not None:
             issued[reading["correction"]] = decision.amount
+        if reading["paused_by"] is not None:  # by the alarm that this reading raised, or one before it
+            issued = {number: amount for number, amount in issued.items() if number not in fell}
         decided.append((reading | {"expected_outstanding": outstanding[:MOST_OUTSTANDING]}, decision))
     return decided
 
