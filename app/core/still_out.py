@@ -1,4 +1,4 @@
-"""Parts that stay out of tolerance although each was corrected for: whatever the cause, going on makes the next one scrap as well.
+"""Parts that stay out of tolerance in spite of corrections in full: whatever the cause, the next part would be scrap as well.
 
 A correction in full brings the next part to the target, unless factor, offset register or unit is wrong, another characteristic of the
 tool takes it back, the control does not use the offset, or the tool wears by the tolerance from part to part. `app.core.gain` and

@@ -157,7 +157,7 @@ def times_unnamed(columns: Mapping[str, Sequence[str]], pattern: str | None = No
 
 
 def _has_date(cell: str, pattern: str | None) -> str:
-    """The part of a time that a cell holds: time, unread (a date in a form that nobody has named, and a time), day, or nothing."""
+    """The part of a time that a cell holds: time, unread (date and time in an unknown form), day, or nothing."""
     text = plain(cell)
     if (not pattern and not _LIKE_A_DATE.search(text)) or text.isdigit() or is_zeros(text):
         return ""

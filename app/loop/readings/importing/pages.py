@@ -36,7 +36,7 @@ from app.web.paging import address
 from app.web.templates import page
 
 AUTOMATIC = "?"
-"""The choice of a column where nobody has chosen one and none is found."""
+"""The choice of a column where none is chosen and none is found."""
 router = APIRouter(include_in_schema=False)
 Token = Annotated[str, Path(max_length=64)]
 HOW = (
