@@ -8,7 +8,8 @@ from zoneinfo import ZoneInfo
 from app.files.formats import spreadsheet
 from app.files.formats.cell_values import Unreadable, number, zone_named
 from app.files.formats.file_times import LIVE, FileTimes
-from app.files.formats.units import LENGTHS, agreed, unit_behind
+from app.files.formats.number_with_unit import agreed_unit, number_and_unit
+from app.files.formats.units import LENGTHS
 
 FIELDS: Final = (
     "characteristic",
@@ -60,7 +61,7 @@ class Form(NamedTuple):
 
     def in_unit(self, *words: Any) -> "Form":
         """The form of sizes whose column, row or cell says their unit. Raises `Unreadable`."""
-        unit = agreed(self.unit, *words)
+        unit = agreed_unit(self.unit, *words)
         return self if unit is None else self._replace(scale=LENGTHS[unit], unit=unit)
 
     def value(self, field: str, value: Any) -> Any:
@@ -73,7 +74,7 @@ class Form(NamedTuple):
         if field == "measured":
             if isinstance(value, bool) or not isinstance(value, int | float | str):
                 raise Unreadable("is not a number")
-            text, behind = unit_behind(text)
+            text, behind = number_and_unit(text)
             size = value if isinstance(value, int | float) else number(text, self._decimal_in(text))
             scale = self.in_unit(behind).scale
             if not isfinite(size * scale):

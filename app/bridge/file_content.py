@@ -50,17 +50,9 @@ from app.files.formats import delimited, spreadsheet
 from app.files.formats.cell_values import Slashed, Unreadable, same_number, slashed, zone_named
 from app.files.formats.file_times import times_of
 from app.files.formats.headings import is_summary
+from app.files.formats.number_with_unit import number_and_unit
 from app.files.formats.repeats import Remark, Repeats
-from app.files.formats.units import (
-    LENGTHS,
-    UnknownUnit,
-    beside,
-    in_celsius,
-    length_unit,
-    unit_behind,
-    unit_in,
-    unit_of_name,
-)
+from app.files.formats.units import LENGTHS, UnknownUnit, beside, in_celsius, length_unit, unit_in, unit_of_name
 
 NAMES: Final = {"csv": "*.csv", "xlsx": "*.xls[xm]", "ndjson": "*.ndjson", "text": "*.txt", "aqdef": "*.df[qdxQDX]"}
 NOT_ALONE: Final = 2  # files of a pair
@@ -279,7 +271,7 @@ class _Reader:
         if not sheet and (self.settings.decimal is not None or self.settings.format != "csv"):
             return ""
         rows = [row for _line, row in table if isinstance(row, Mapping)]
-        cells = [unit_behind(str(cell_of(row, column) or "")) for row in rows]
+        cells = [number_and_unit(str(cell_of(row, column) or "")) for row in rows]
         said = {
             unit,
             *(length_unit(str(beside(row, "unit") or "")) for row in rows),

@@ -12,8 +12,9 @@ from app.core.number_text import number_or_none
 from app.files.formats import delimited
 from app.files.formats.file_times import times_unnamed
 from app.files.formats.headings import TOP, Heading, as_wide, heading, is_labelled, is_reading, others
+from app.files.formats.number_with_unit import number_and_unit
 from app.files.formats.repeats import Remark, Repeats
-from app.files.formats.units import LENGTHS, is_unit_column, unit_above, unit_behind, unit_in
+from app.files.formats.units import LENGTHS, is_unit_column, unit_above, unit_in
 
 
 class Fault(NamedTuple):
@@ -216,7 +217,7 @@ def _place_of_a_size(cells: Sequence[str]) -> int:
     numbers = [
         (text.isdigit(), at)
         for at, cell in enumerate(cells, 1)
-        if number_or_none(text := unit_behind(cell)[0]) is not None
+        if number_or_none(text := number_and_unit(cell)[0]) is not None
     ]
     return min(numbers, default=(False, 1))[1]
 

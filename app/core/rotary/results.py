@@ -11,6 +11,7 @@ from itertools import pairwise
 from math import isfinite
 from typing import NamedTuple
 
+from app.core.number_text import NotANumber, NumberFault, read_number
 from app.core.rotary.axis import ERRORS, AxisName
 
 WIDTH, NUMBERS = 10, 4
@@ -22,7 +23,6 @@ OPTIMISED: dict[str, AxisName] = {"Q144": "A", "Q145": "B", "Q146": "C"}
 OFFSETS = {"Q147": "X", "Q148": "Y", "Q149": "Z"}
 SCALARS = (*MEASURED, *OPTIMISED, *OFFSETS)
 LARGEST = 1e5  # mm or degrees; nothing on a machine is further off
-_NUMBER = re.compile(r"[+-]?(\d++(?:[.,]\d*)?|[.,]\d+)")
 _APART = re.compile(r"(?<=\d)(?=[+\N{MINUS SIGN}-]\d)")
 _BEGIN = re.compile(r"(?:(?<![\w.,=:])(?<![=:] )N?\d+\s+)?(?<!\w)QS?1[0-9]{2}\s*[=:]", re.IGNORECASE)
 _LINE = re.compile(r"""\s*+(?:N?\d+\s+)?(QS?1[0-9]{2})(?:\s*+[=:;]\s*+|\s++)["'“”„«]?(.*)""", re.IGNORECASE)
@@ -90,7 +90,7 @@ def read_string(parameter: str, text: str) -> ResultString:
         flaws.append(Flaw(parameter, 0, Damage.COUNT, str(len(parts))))
         return ResultString(values, tuple(flaws))
     for number, (name, part) in enumerate(zip(names, parts, strict=False), start=1):
-        value, damage = read_number(part)
+        value, damage = _read_number(part)
         values[name] = value
         if value is not None and len(part) != WIDTH:
             damage = damage or Damage.LENGTH
@@ -102,19 +102,19 @@ def read_string(parameter: str, text: str) -> ResultString:
     return ResultString(values, tuple(flaws))
 
 
-def read_number(text: str) -> tuple[float | None, Damage | None]:
+def _read_number(text: str) -> tuple[float | None, Damage | None]:
     """A number as the control writes it, and what is wrong with it; a decimal comma is read and reported.
 
-    >>> read_number("-0.0123456"), read_number("0,5"), read_number("1.2.3")[1].value
+    >>> _read_number("-0.0123456"), _read_number("0,5"), _read_number("1.2.3")[1].value
     ((-0.0123456, None), (0.5, <Damage.COMMA: 'comma'>), 'not_a_number')
     """
-    plain = text.strip().replace("\N{MINUS SIGN}", "-")
-    if not plain.isascii() or _NUMBER.fullmatch(plain) is None:
+    try:
+        value = read_number(text)
+    except NotANumber as error:
+        return None, Damage.TOO_LARGE if error.fault is NumberFault.TOO_LARGE else Damage.NOT_A_NUMBER
+    if "e" in text.lower():  # the control writes no exponent
         return None, Damage.NOT_A_NUMBER
-    value = float(plain.replace(",", "."))
-    if not isfinite(value) or abs(value) > LARGEST:
-        return None, Damage.TOO_LARGE
-    return value + 0.0, Damage.COMMA if "," in plain else None
+    return (None, Damage.TOO_LARGE) if abs(value) > LARGEST else (value, Damage.COMMA if "," in text else None)
 
 
 def write_string(values: Sequence[float]) -> str:
@@ -165,7 +165,7 @@ def read_results(text: str) -> Results:
             flaws += read.flaws
             errors[STRINGS[name]] = read.values
         else:
-            value, damage = read_number(value_text.removesuffix("mm").removesuffix("мм"))
+            value, damage = _read_number(value_text.removesuffix("mm").removesuffix("мм"))
             if value == NOT_MEASURED and name not in OFFSETS:
                 value, damage = None, None
             elif value is not None and value < 0 and name not in OFFSETS:

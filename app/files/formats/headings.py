@@ -10,7 +10,8 @@ from app.files.formats import delimited
 from app.files.formats.cell_values import folded
 from app.files.formats.column_names import NAMES, SUMMARIES, key_of
 from app.files.formats.delimited import Row
-from app.files.formats.units import OTHER_UNITS, is_unit_column, length_unit, unit_behind
+from app.files.formats.number_with_unit import number_and_unit, number_before_unit
+from app.files.formats.units import OTHER_UNITS, is_unit_column, length_unit
 
 TOP = 500  # rows in which the heading is looked for
 FIRST = 50  # of them, in which another may stand than the one that is found
@@ -146,7 +147,7 @@ def _beside_words(
 
 def _is_measured(cell: str) -> bool:
     """Tell of a size with decimals or with its unit, a date, or a time."""
-    text, unit = unit_behind(cell)
+    text, unit = number_and_unit(cell)
     if number_or_none(text) is None:
         return delimited.is_value(cell)
     return bool(unit) or not text.strip().lstrip("+-").isdigit()
@@ -159,7 +160,7 @@ def _whole(cell: str) -> int | None:
 
 def _is_far(number: int, cells: Iterable[str]) -> bool:
     """Tell of a number that is of another kind than those below it, such as 1 above 40,001."""
-    sizes = [abs(size) for cell in cells if (size := number_or_none(unit_behind(cell)[0])) is not None]
+    sizes = [abs(size) for cell in cells if (size := number_before_unit(cell)) is not None]
     return bool(sizes) and (FAR * (number + 1) < min(sizes) or number > FAR * (max(sizes) + 1))
 
 

@@ -2,9 +2,8 @@
 
 from collections.abc import Mapping, Sequence
 
-from app.core.number_text import NotANumber, read_number
 from app.files.formats.delimited import Row
-from app.files.formats.units import unit_behind
+from app.files.formats.number_with_unit import number_before_unit
 from app.language.i18n import _
 
 OF_A_CHARACTERISTIC = {"characteristic", "nominal", "upper", "lower", "natural_limit"}
@@ -43,8 +42,4 @@ def _are_sizes(place: int, rows: Sequence[Row]) -> bool:
 
 
 def _is_size(cell: str) -> bool:
-    try:
-        read_number(unit_behind(cell)[0])
-    except NotANumber:
-        return not cell.strip()
-    return True
+    return not cell.strip() or number_before_unit(cell) is not None

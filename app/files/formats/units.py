@@ -1,4 +1,7 @@
-"""Units of length, as files and headers of columns name them: one table for every door, so that no size becomes a silent mm."""
+"""Units of length, as files and headers of columns name them: one table for every door, so that no size becomes a silent mm.
+
+A number with its unit behind it is read in `app.files.formats.number_with_unit`.
+"""
 
 import re
 from collections.abc import Iterable, Mapping, Sequence
@@ -50,9 +53,7 @@ OTHER_UNITS: Final = frozenset(
 _ONLY_AS_WRITTEN: Final = {"nm": {"nm"}, "m": {"m"}, "mm": {"mm", "MM"}}
 """Units whose other cases are something else: Nm is a torque, M a million, Mm a million metres."""
 _BRACKETS: Final = re.compile(r"\[([^\[\]]*)\]|\(([^()]*)\)|<([^<>]*)>")
-_BEHIND: Final = re.compile(r"(.*\d[.,]?)\s*([^\d\s.,]{1,12})")
 LONGEST_SIZE: Final = 400  # characters; what is longer is not a size
-_LARGEST: Final = 1e300  # what is larger would become infinite
 _LAST_WORD: Final = re.compile(r"[_ ]([^_ ]+)$")
 _OTHER_SCALES: Final = {"f", "fahrenheit", "k", "kelvin", "r", "rankine", "℉"}
 _WORDS_OF: Final = re.compile(r"[^\W\d_]+")
@@ -241,43 +242,6 @@ def _unmistakable(text: str) -> list[str]:
     return [word for word in words if word.lower() in _UNMISTAKABLE and length_unit(word)]
 
 
-def unit_behind(text: str) -> tuple[str, str]:
-    """A size and the unit of length behind it; no unit where none that is known stands there.
-
-    >>> unit_behind("12,003 mm"), unit_behind('0.4724"'), unit_behind("12.003"), unit_behind("25 Nm")
-    (('12,003', 'mm'), ('0.4724', '"'), ('12.003', ''), ('25 Nm', ''))
-    """
-    match = _BEHIND.fullmatch(text.strip()) if len(text) <= LONGEST_SIZE else None
-    return (match[1], match[2]) if match is not None and length_unit(match[2]) else (text, "")
-
-
-def agreed(unit: str | None, *words: Any) -> str | None:
-    """The unit of a size: of its column, as the header or a person says, and of its row and cell. None where nobody says one.
-
-    >>> agreed(None, "", "Zoll"), agreed("um", "µm"), agreed(None, None)
-    ('inch', 'um', None)
-
-    Raises `Unreadable` where one is not known, or they contradict each other.
-    """
-    for word in (str(each).strip() for each in words if each is not None):
-        said = length_unit(word) if word else unit
-        if word and said is None:
-            known = ", ".join(LENGTHS)
-            raise Unreadable(
-                _("names the unit {word}, which is no length that is known ({known})").format(
-                    word=repr(word), known=known
-                )
-            )
-        if unit is not None and said != unit:
-            raise Unreadable(
-                _("is in {said}, its column or row says {unit}: nobody can tell which counts").format(
-                    said=said, unit=unit
-                )
-            )
-        unit = said
-    return unit
-
-
 @lru_cache(maxsize=4096)
 def _names(name: str, field: str) -> bool:
     return key_of(name) in _COLUMNS[field]
@@ -360,15 +324,6 @@ def unit_above(titles: Iterable[Sequence[str]]) -> str | None:
     if len(several) > bool(said):
         raise UnknownUnit(", ".join(dict.fromkeys(several)))
     return next(iter(said), None)
-
-
-def in_mm(value: Any, unit: str | None) -> Any:
-    """Lengths in mm: a number, or a list of them; what is neither stays as it is."""
-    scale = LENGTHS[unit or "mm"]
-    if isinstance(value, list):
-        return [in_mm(each, unit) for each in value]
-    is_length = isinstance(value, int | float) and not isinstance(value, bool)
-    return round(value * scale, 9) if is_length and scale != 1.0 and abs(value) < _LARGEST else value
 
 
 def like_a_unit(word: str, *, least_doubt: bool = False) -> bool:

@@ -12,7 +12,8 @@ from typing import NamedTuple
 from app.core.number_text import number_or_none
 from app.files.formats.cell_values import Unreadable as WrongUnit
 from app.files.formats.column_names import NAMES, key_of
-from app.files.formats.units import LENGTHS, UnknownUnit, agreed, beside, in_mm, unit_behind, unit_in
+from app.files.formats.number_with_unit import agreed_unit, in_mm, number_and_unit
+from app.files.formats.units import LENGTHS, UnknownUnit, beside, unit_in
 from app.language.i18n import _
 from app.language.numbers import as_typed
 
@@ -109,7 +110,7 @@ def sizes_in_mm(
     """
     units: dict[int, str | None] = {}
     for place, name in enumerate(heading or ()):
-        if any(number(unit_behind(row[place])[0]) is not None for row in body if place < len(row)):
+        if any(number(number_and_unit(row[place])[0]) is not None for row in body if place < len(row)):
             try:
                 units[place] = unit_in(name)
             except UnknownUnit as error:
@@ -120,10 +121,10 @@ def sizes_in_mm(
         said = beside(dict(zip(heading or (), row, strict=False)), "unit") if sizes else None
         cells = []
         for place, cell in enumerate(row):
-            size, behind = unit_behind(cell)
+            size, behind = number_and_unit(cell)
             value = number(size) if not sizes or place in sizes else None
             try:
-                unit = None if value is None else agreed(units.get(place), said, behind)
+                unit = None if value is None else agreed_unit(units.get(place), said, behind)
             except WrongUnit as error:
                 raise Unreadable(at, place + 1, _("“{text}” {reason}").format(text=cell[:30], reason=error)) from None
             cells.append(cell if unit is None else as_typed(in_mm(value, unit)))

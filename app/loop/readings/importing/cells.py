@@ -18,7 +18,8 @@ from app.files.formats.cell_values import Unreadable, same_number
 from app.files.formats.column_names import TEMPERATURES
 from app.files.formats.delimited import Row, Unusable
 from app.files.formats.headings import is_labelled, is_summary
-from app.files.formats.units import agreed, in_mm, unit_behind, unit_of_name
+from app.files.formats.number_with_unit import agreed_unit, in_mm, number_and_unit
+from app.files.formats.units import unit_of_name
 from app.language.i18n import _
 from app.loop.readings.importing.columns import DRAWN, ORIGIN, VERDICT
 from app.loop.readings.importing.layout import (
@@ -259,7 +260,7 @@ def _of_row(row: Row, layout: Layout, readers: Sequence["_Reader"]) -> Iterator[
     for name, places, read in readers:
         text = size = " ".join(row.cells[place] for place in places).strip()
         if name == "measured":
-            size, behind = unit_behind(text)
+            size, behind = number_and_unit(text)
         try:
             if layout.kind == "sheet":
                 spreadsheet.refuse_error(text)
@@ -289,7 +290,9 @@ def _in_mm(
     """
     said = values.pop("unit", None)
     try:
-        unit = agreed(layout.said_unit, said, behind, unit_of_name(name, layout.said_unit or said or behind or None))
+        unit = agreed_unit(
+            layout.said_unit, said, behind, unit_of_name(name, layout.said_unit or said or behind or None)
+        )
     except Unreadable as error:
         column = layout.named("unit") if said else layout.named("measured")
         reason = str(error)

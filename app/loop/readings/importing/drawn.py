@@ -8,7 +8,8 @@ from app.core.natural import NaturalLimit
 from app.core.number_text import NotANumber, read_number
 from app.files.formats.cell_values import Unreadable, folded
 from app.files.formats.column_names import LOWER_LIMITS, LOWER_OF_EITHER, UPPER_LIMITS, UPPER_OF_EITHER
-from app.files.formats.units import UnknownUnit, agreed, in_mm, unit_in, unit_of_name
+from app.files.formats.number_with_unit import agreed_unit, in_mm
+from app.files.formats.units import UnknownUnit, unit_in, unit_of_name
 from app.language.i18n import _
 from app.loop.readings.aqdef.matching import Content, not_new
 from app.loop.readings.importing.columns import is_both_ways, is_tolerance, is_unsigned
@@ -184,7 +185,7 @@ def _length(name: str, drawn: Drawn, layout: Layout, field: str) -> float | None
     if not text:
         return None
     try:
-        unit = agreed(
+        unit = agreed_unit(
             unit_in(layout.named(field)) or layout.said_unit,
             drawn.unit,
             unit_of_name(name, layout.said_unit or drawn.unit or None),

@@ -14,7 +14,8 @@ from app.files.formats.cell_values import slashed
 from app.files.formats.delimited import Row, Unusable
 from app.files.formats.file_times import FileTimes, times_of, times_unnamed
 from app.files.formats.headings import TOP, as_wide, heading, is_reading, is_summary, others
-from app.files.formats.units import LENGTHS, UnknownUnit, length_unit, unit_above, unit_behind
+from app.files.formats.number_with_unit import number_and_unit
+from app.files.formats.units import LENGTHS, UnknownUnit, length_unit, unit_above
 from app.language.i18n import _
 from app.loop.readings.importing.columns import DRAWN, by_places, columns_of, fits, guesses_of, nominal_of
 from app.loop.readings.importing.refusals import (
@@ -272,7 +273,7 @@ def _csv_layout(path: Path, wishes: Wishes, zone: ZoneInfo | None, kind: str = "
     # Where no column is the measured one, it may be any of them, or several.
     only = slice(place, place + 1) if "measured" in columns else slice(None)
     below = [row for row in chain(top, islice(rows, 200)) if row.line >= first_line]
-    sample = [unit_behind(cell)[0] for row in below for cell in row.cells[only]]
+    sample = [number_and_unit(cell)[0] for row in below for cell in row.cells[only]]
     above, doubt = _above([row.cells for row in top if row.line < head])
     units = tuple(unit or above for unit in units or (None,) * len(header))
     made = Layout(
@@ -321,7 +322,7 @@ def _letters(rows: Iterable[Row]) -> str:
 
 def _thousands(rows: Sequence[Row], places: Iterable[int], kind: str) -> dict[int, str]:
     """A number in which a sign may part thousands for each of these columns where no number tells."""
-    texts = {place: [unit_behind(text_of(row, (place,)))[0] for row in rows] for place in places}
+    texts = {place: [number_and_unit(text_of(row, (place,)))[0] for row in rows] for place in places}
     found = {place: delimited.like_thousands(each, sheet=kind == "sheet") for place, each in texts.items()}
     return {place: number for place, number in found.items() if number}
 
@@ -330,7 +331,10 @@ def _units_of(layout: Layout, rows: Sequence[Row]) -> set[str | None]:
     """The units of the measured sizes of these rows, as far as they are known."""
     units = {layout.said_unit}
     for row in rows:
-        said = (text_of(row, layout.columns.get("unit", ())), unit_behind(text_of(row, layout.columns["measured"]))[1])
+        said = (
+            text_of(row, layout.columns.get("unit", ())),
+            number_and_unit(text_of(row, layout.columns["measured"]))[1],
+        )
         units |= {length_unit(word) for word in said if word}
     return units
 
