@@ -7,6 +7,7 @@ import pytest
 
 from app.bridge.fields import Form
 from app.files.formats.number_with_unit import agreed_unit, in_mm, number_and_unit, number_before_unit
+from app.loop.readings.importing import drawn
 from app.loop.readings.importing.layout import Wishes, look
 from app.loop.readings.importing.lines import Line, lines
 from app.quality.gauge_studies.table_reader import sizes_in_mm
@@ -21,8 +22,17 @@ def _import(text: str, folder: Path) -> float | None:
     return found.reading.measured
 
 
+def _nominal(text: str, folder: Path) -> float | None:
+    path = folder / "a.csv"
+    path.write_text(f"Feature;Nominal;Upper deviation;Lower deviation;Actual\nA;{text};{text};-{text};{text}\n")
+    (found,) = drawn.contents(look(path, Wishes()))
+    assert not found.not_new, found.not_new
+    return found.nominal
+
+
 DOORS: dict[str, Callable[[str, Path], float | None]] = {
     "import": _import,
+    "nominal size of an import": _nominal,
     "pasted table": lambda text, _folder: float(sizes_in_mm(None, [[text]])[0][0]),
     "bridge": lambda text, _folder: float(Form(1.0, "," if "," in text else ".").value("measured", text)),
 }

@@ -8,7 +8,7 @@ from app.core.natural import NaturalLimit
 from app.core.number_text import NotANumber, read_number
 from app.files.formats.cell_values import Unreadable, folded
 from app.files.formats.column_names import LOWER_LIMITS, LOWER_OF_EITHER, UPPER_LIMITS, UPPER_OF_EITHER
-from app.files.formats.number_with_unit import agreed_unit, in_mm
+from app.files.formats.number_with_unit import agreed_unit, in_mm, number_and_unit
 from app.files.formats.units import UnknownUnit, unit_in, unit_of_name
 from app.language.i18n import _
 from app.loop.readings.aqdef.matching import Content, not_new
@@ -184,13 +184,11 @@ def _length(name: str, drawn: Drawn, layout: Layout, field: str) -> float | None
     text = getattr(drawn, field).removeprefix("±").removeprefix("+/-").removeprefix("+-")
     if not text:
         return None
+    number, behind = number_and_unit(text)
     try:
-        unit = agreed_unit(
-            unit_in(layout.named(field)) or layout.said_unit,
-            drawn.unit,
-            unit_of_name(name, layout.said_unit or drawn.unit or None),
-        )
-        length: float = in_mm(read_number(text), unit)
+        said = unit_of_name(name, layout.said_unit or drawn.unit or behind or None)
+        unit = agreed_unit(unit_in(layout.named(field)) or layout.said_unit, drawn.unit, behind, said)
+        length: float = in_mm(read_number(number), unit)
     except (NotANumber, Unreadable, UnknownUnit) as error:
         reason = str(error) if isinstance(error, Unreadable) else _("is not a number, or in no unit that is known")
         raise _Wrong(f"{layout.named(field)} {text[:40]!r} {reason}") from None
