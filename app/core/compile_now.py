@@ -4,7 +4,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from app.core.effect import measured_effect
+from app.core.measured_gain import measured_effect
 from app.core.parameters import Parameters
 from app.core.replay import Policy, ReplayedCharacteristic, figures_of, run, without_events
 from app.core.spc.cusum import cusum

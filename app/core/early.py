@@ -8,7 +8,7 @@ the corrections that it counts as cut with have done to it, and u what those tha
 
 u is that of corrections which act after 0, 1, … `LATEST` parts, from the part on that asked for them, less those counted already.
 h is 0 where the count is right and near g where it is not; far above g where an edge breaks just when a correction acts. As in
-`app.core.gain` one Kalman filter predicts D and each regressor alike, and least squares of its innovations give g, h and the drift;
+`app.core.opposite_effect` one Kalman filter predicts D and each regressor alike, and least squares of its innovations give g, h and the drift;
 g is 1 to within 1 before, the drift 0 to within the scatter. The scatter is that of the residuals; while few parts have shown it, h
 is taken for less sure. The limits are those with which no simulated tool life is taken for one of these (tests/core/test_early.py).
 Lengths are mm.
@@ -74,8 +74,8 @@ def acts_early(
 ) -> tuple[int, float, float]:
     """Return after how many parts corrections act, where they act before they are counted, else -1; h and its standard error.
 
-    deviation, compensated: as in `app.core.gain.opposed`; outstanding: by how much those that a part counts as cut without will
-    change its size. What is before `begin` does not count. expected: the scatter to begin with (`app.core.gain.expected_scatter`).
+    deviation, compensated: as in `app.core.opposite_effect.opposed`; outstanding: by how much those that a part counts as cut without will
+    change its size. What is before `begin` does not count. expected: the scatter to begin with (`app.core.opposite_effect.expected_scatter`).
 
     >>> total = np.array([0, 5, 0, 5, 0, 5, 0, 5, 0, 5]) * -1e-3  # of corrections: all in effect, none counted
     >>> scatter = np.array([1, 3, -2, 0, 2, -3, 1, -1, 2, 0]) * 1e-4

@@ -1,13 +1,13 @@
 """Corrections that act about twice as strongly as they ask, and drive parts out of tolerance: a radius taken for a diameter.
 
-With a gain of 2 (`app.core.gain`) each correction in full puts the size as far off on the other side of the target, and so does the
+With a gain of 2 (`app.core.opposite_effect`) each correction in full puts the size as far off on the other side of the target, and so does the
 next one; above 2 it goes further each time. Below, and where R33 or the average (k) takes the size up, the swing ends by itself. So the
 tool is paused only once both are there: parts out of tolerance since the two newest corrections, which take each other back, and a
 gain that is credibly above 1.5, by all corrections among the newest `RECENT` parts::
 
     gain = sum(v_D v_x / F) / sum(v_x^2 / F),    gain - 4.75 errors > 1.5
 
-One filter, one scatter and one way to choose the two with `app.core.gain`; there is no trend, for wear helps every other correction
+One filter, one scatter and one way to choose the two with `app.core.opposite_effect`; there is no trend, for wear helps every other correction
 as much as it hinders the next. The limits are those with which simulated tool lives are never paused (docs/reference/gain.md).
 Lengths are mm.
 """
@@ -19,7 +19,19 @@ import numpy as np
 from numpy.typing import NDArray
 
 from app.core.compiled import compiled
-from app.core.gain import BEFORE, LEAST, MOST, NM, RECENT, UNLIKE, Step, newest_two, regressed, scatter_of, steps_of
+from app.core.opposite_effect import (
+    BEFORE,
+    LEAST,
+    MOST,
+    NM,
+    RECENT,
+    UNLIKE,
+    Step,
+    newest_two,
+    regressed,
+    scatter_of,
+    steps_of,
+)
 
 Floats = NDArray[np.float64]
 
@@ -51,7 +63,7 @@ def overshoot(
 ) -> Overshoot | None:
     """The two newest corrections, if corrections act clearly too strongly and parts cut after the first of the two are out of tolerance.
 
-    half: of the tolerance; all else as in `app.core.gain.opposed`.
+    half: of the tolerance; all else as in `app.core.opposite_effect.opposed`.
 
     >>> d, s = np.array([0.01, -0.0098, 0.0102, -0.01, 0.0099, -0.0101]), np.array([0, -0.01, -0.0002, -0.0104, -0.0004, -0.0103])
     >>> found = overshoot(d, s, -1.0, 0, 0.0005, 0.005, 0.008)

@@ -14,7 +14,7 @@ Everything else happens as it did: edges are changed at the same parts (S' begin
 set to the same values, pauses, rejected and implausible readings are those of then. A correction held in the wear zone
 waits until the one that was held then was released, if it was. The pipeline is of one length.
 
-Assumed is that corrections act in full, e = 1; `app.core.effect` measures e. Lengths are mm.
+Assumed is that corrections act in full, e = 1; `app.core.measured_gain` measures e. Lengths are mm.
 """
 
 from collections.abc import Callable, Sequence

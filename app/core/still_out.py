@@ -1,7 +1,7 @@
 """Parts that stay out of tolerance in spite of corrections in full: whatever the cause, the next part would be scrap as well.
 
 A correction in full brings the next part to the target, unless factor, offset register or unit is wrong, another characteristic of the
-tool takes it back, the control does not use the offset, or the tool wears by the tolerance from part to part. `app.core.gain` and
+tool takes it back, the control does not use the offset, or the tool wears by the tolerance from part to part. `app.core.opposite_effect` and
 `app.core.overshoot` say which it is where the sizes can tell; here it is the outcome alone that counts. Looking back from the newest
 part, all are out of tolerance; `MOST` of them are so with everything counted in that was on its way to them, and for each of these
 a correction in full went out, or would now.

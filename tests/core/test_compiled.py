@@ -21,7 +21,7 @@ from app.core.compile_now import compile_each
 from app.core.compiled import compiled, functions_of, plain
 from app.core.control_plan import Plan
 from app.core.decision.loops import follow, follow_each
-from app.core.effect import _missed, measured_effect
+from app.core.measured_gain import _missed, measured_effect
 from app.core.replay import Policy, ReplayedCharacteristic, figures_of, sampled, without_events
 from app.core.spc.cusum import _sums, cusum
 from app.core.spc.ewma import _smoothed, ewma

@@ -9,7 +9,7 @@ from numba import njit
 import app.core.decision.loops  # noqa: F401 - compiles what `step` calls
 from app.core.decision.step import BELIEVED, CORRECT, effect_of, rounded, step
 from app.core.early import acts_early
-from app.core.gain import LONGEST, expected_scatter
+from app.core.opposite_effect import LONGEST, expected_scatter
 from tests.chance import runs
 from tests.core.tool_lives import SETTINGS, rules_of
 
@@ -70,7 +70,7 @@ def life(rules, of, late, tolerance, watched):  # type: ignore[no-untyped-def]  
 @pytest.mark.parametrize("broken", [False, True])
 @runs(1_000, 40_000)
 def test_no_loop_whose_parts_are_counted_right_is_taken_for_one(runs: int, *, broken: bool) -> None:
-    """As in `test_gain`, with wear of up to 1.5 standard deviations a part, and up to five parts on the way.
+    """As in `test_opposite_effect`, with wear of up to 1.5 standard deviations a part, and up to five parts on the way.
 
     broken: the edge breaks, as it may in the part that is cut with a correction first; of 40,000 such lives 5 are paused.
     """

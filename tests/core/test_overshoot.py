@@ -5,7 +5,7 @@ from statistics import mean
 import numpy as np
 import pytest
 
-from app.core.gain import expected_scatter
+from app.core.opposite_effect import expected_scatter
 from tests.chance import runs
 from tests.core.tool_lives import SETTINGS, STRONG, Life, life, lives, rules_of
 

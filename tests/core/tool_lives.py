@@ -8,7 +8,7 @@ from numba import njit
 
 import app.core.decision.loops  # noqa: F401 - compiles what `step` calls
 from app.core.decision.step import BELIEVED, CORRECT, Rules, effect_of, rounded, step
-from app.core.gain import LONGEST, expected_scatter, judge
+from app.core.opposite_effect import LONGEST, expected_scatter, judge
 from app.core.overshoot import judge_strong
 
 OPPOSED, STRONG = 1, 2

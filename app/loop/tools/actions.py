@@ -57,7 +57,7 @@ class Decided(NamedTuple):
 
 
 class Restarted(NamedTuple):
-    """A tool whose offset was set again; open corrections fell, averages began again."""
+    """A tool whose offset was set again: open corrections were superseded, averages began again."""
 
     tool: Tool
     superseded: list[int]

@@ -6,8 +6,8 @@ import numpy as np
 from sqlalchemy import func, literal_column, select
 from sqlalchemy.orm import Session
 
-from app.core.effect import Gain, GainVerdict, gain_of
-from app.core.gain import expected_scatter, overdone
+from app.core.measured_gain import Gain, GainVerdict, gain_of
+from app.core.opposite_effect import expected_scatter, overdone
 from app.core.parameters import Parameters
 from app.loop.tables.alarms import Alarm
 from app.loop.tables.characteristics import Characteristic, ParametersVersion

@@ -12,7 +12,7 @@ from app.quality.trial.schemas import StartedOut, TrialOut
 from app.quality.trial.verbs import START, OfTrial
 from app.web.api import CharacteristicKey, api_router, problems
 from app.web.deps import SessionDep
-from app.web.verb import draw
+from app.web.verb import add_json_route
 
 router = api_router("what-if")
 
@@ -41,7 +41,7 @@ def _of_trial(session: SessionDep, caller: Engineer, characteristic: Characteris
     return OfTrial(session, characteristic, caller)
 
 
-draw(
+add_json_route(
     router,
     "/characteristics/{characteristic}/trial/start",
     START,

@@ -2,7 +2,7 @@
 
 from typing import Any
 
-from app.core.effect import Effect
+from app.core.measured_gain import Effect
 from app.core.replay import Figures
 from app.core.spc.quoting import Quoting
 from app.core.spc.refusal import Refused

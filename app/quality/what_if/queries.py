@@ -13,7 +13,7 @@ from app.core.control_plan import Plan
 from app.core.decision.limits import FAULT, WEAR, in_nanometres, nanometres, reaches, within
 from app.core.decision.loops import ReplayResult, Whole
 from app.core.decision.step import OFFSET_LIMIT
-from app.core.effect import Effect, measured_effect
+from app.core.measured_gain import Effect, measured_effect
 from app.core.parameters import Feature, ParameterError, Parameters, read
 from app.core.policy_map import Criterion, Region, best_region, in_order, with_settings
 from app.core.replay import FEWEST_FOR_PPK, Figures, Sampled, agreement, figures_of, run, sampled

@@ -17,7 +17,7 @@ from app.quality.capability import wording as capability
 from app.quality.capability.wording import named
 
 if TYPE_CHECKING:
-    from app.core.effect import Effect
+    from app.core.measured_gain import Effect
     from app.quality.what_if.proposals import ProposalRow
     from app.quality.what_if.queries import Likeness, Sampling
     from app.quality.what_if.tool_history import ToolHistory

@@ -18,7 +18,7 @@ from app.core.decision.limits import ZONES
 from app.core.decision.loops import SERIES, Quiet, Series, quiet_run, rows_of
 from app.core.decision.step import CODES, Action
 from app.core.early import acts_early
-from app.core.gain import LONGEST, judge
+from app.core.opposite_effect import LONGEST, judge
 from app.core.overshoot import judge_strong
 from app.errors import InbandError
 from app.loop.readings.records import Entry, Record

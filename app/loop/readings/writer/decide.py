@@ -22,9 +22,9 @@ from app.language.i18n import _
 from app.loop.readings.miscounted import TooManyTouches
 from app.loop.readings.records import Entry
 from app.loop.readings.schemas import ReadingIn
+from app.loop.readings.writer.correction_guards import guard_correction, name_correction, part_of, remember
 from app.loop.readings.writer.corrections_in_effect import confirm, corrections_in_effect, issued_total
 from app.loop.readings.writer.doubts import doubt
-from app.loop.readings.writer.opposed import name_correction, part_of, pauses, remember
 from app.loop.readings.writer.pending import (
     PendingAlarm,
     PendingCorrection,
@@ -122,18 +122,18 @@ def decide_reading(pending: PendingWrites, entry: Entry, reading: ReadingIn, now
     late = stream.last_measured_at is not None and measured_at < stream.last_measured_at
     newest = None if compensated is None or late or jump or fault else part_of(sequence, decision, compensated)
     asking = newest if decision.amount is not None else None
-    opposed = pauses(pending, stream, asking, reading, now)
-    if opposed is None and paused_by is None:
-        opposed = behind(pending, stream, decision, lag, previous_tool=previous_tool)
-    if opposed is not None:
-        paused_by, decision = opposed, judged(paused=True)
+    pausing = guard_correction(pending, stream, asking, reading, now)
+    if pausing is None and paused_by is None:
+        pausing = behind(pending, stream, decision, lag, previous_tool=previous_tool)
+    if pausing is not None:
+        paused_by, decision = pausing, judged(paused=True)
     if paused_by is not None and lag is not None:
         outstanding = ()
     alarms = [_signal(pending, stream, signal, sequence, decision, results, fault) for signal in decision.alarms]
     name_correction(alarms, stream, newest)
     name_clock(alarms if timed else (), reading, now)
     asked = doubt(pending, stream, reading, sequence) or ask_of_clock(pending, stream, reading, decision, timed=timed)
-    alarms += [alarm for alarm in (opposed, asked) if alarm is not None]
+    alarms += [alarm for alarm in (pausing, asked) if alarm is not None]
     correction = (
         _issue(pending, stream, tool, sequence, decision, now) if tool and decision.amount is not None else None
     )

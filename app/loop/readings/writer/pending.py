@@ -15,7 +15,7 @@ from msgspec import structs
 from app.core.clock import FEWEST
 from app.core.decision.decide import Decision
 from app.core.decision.limits import Zone
-from app.core.gain import LONGEST
+from app.core.opposite_effect import LONGEST
 from app.core.parameters import Parameters
 from app.core.variants import Results
 from app.loop.readings.records import Entry, Record
@@ -151,7 +151,7 @@ class PendingTool:
         return correction
 
     def pause(self, alarm: PendingAlarm) -> None:
-        """Correct nothing through this tool until the alarm is answered; open corrections fall."""
+        """Correct nothing through this tool until the alarm is answered; open corrections are superseded."""
         self.paused_by, self.changed = alarm, True
         for place, correction in enumerate(self.corrections):
             if correction.status in OPEN:

@@ -17,8 +17,8 @@ from app.core.decision.decide import Decision, ReadingAlarm
 from app.core.decision.limits import nanometres
 from app.core.decision.step import Code
 from app.loop.readings.schemas import ReadingIn
+from app.loop.readings.writer.correction_guards import paused
 from app.loop.readings.writer.doubts import ask, cut_before_issue
-from app.loop.readings.writer.opposed import paused
 from app.loop.readings.writer.pending import PendingAlarm, PendingStream, PendingWrites
 from app.loop.readings.writer.snapshot import Arrival
 from app.loop.tables.tools import EARLY

@@ -12,7 +12,7 @@ import msgspec
 from app.core.clock import FEWEST
 from app.core.control_plan import MISSED_ALARM
 from app.core.decision.limits import Zone
-from app.core.gain import LONGEST
+from app.core.opposite_effect import LONGEST
 from app.core.variants import Results
 from app.db.events import CHANNEL, PUBLISHED
 from app.loop.readings.records import Record

@@ -1,4 +1,4 @@
-"""Do corrections act in full? The share e of a commanded change of size that arrives, measured on a closed loop.
+"""The gain of many corrections, measured on a closed loop: the share e of a commanded change of size that arrives.
 
 A deviation is the process without corrections less what the corrections in effect, S (mm of offset), have changed::
 
@@ -11,9 +11,9 @@ up. So w is a local line, which wears and warms up now quicker, now slower, unde
     w_i = level_i + noise,  level_i+1 = level_i + slope_i + random step,  slope_i+1 = slope_i + random step
 
 and e the size of interventions in it (Box and Tiao 1975, J. Am. Stat. Assoc. 70, 70; Harvey 1989, Forecasting, structural time
-series models and the Kalman filter, section 7.3). One Kalman filter foretells D and -S / f each reading alike; what it
-misses of D is e times what it misses of -S / f, and scatter: a weighted least-squares line, whose slope is e. S_i was decided from
-readings before i, so what is missed of it owes nothing to the scatter of i: the loop being closed does no harm.
+series models and the Kalman filter, section 7.3). One Kalman filter predicts D and -S / f with the same
+weights; its prediction errors of D are e times those of -S / f, plus scatter: a weighted least-squares line, whose slope is e. S_i was
+decided from readings before i, so its prediction error does not depend on the scatter of i: the loop being closed does no harm.
 
 The variances of the steps are those of the greatest likelihood on a grid. Readings further off than `OUTLIER` standard deviations are
 taken as missing (a chip under the stylus); after three of them in a row the course begins again (an edge that broke).

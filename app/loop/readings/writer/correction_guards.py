@@ -1,7 +1,7 @@
 """The guards before each correction: corrections that do the opposite of what they ask, too much, or nothing for parts out of tolerance,
 or act before they are counted.
 
-Judged by `app.core.gain`, `app.core.overshoot`, `app.core.early` and `app.core.still_out` on the newest parts of the stream (`PendingStream.parts`), when the
+Judged by `app.core.opposite_effect`, `app.core.overshoot`, `app.core.early` and `app.core.still_out` on the newest parts of the stream (`PendingStream.parts`), when the
 next correction would go out; each pauses the tool. A reading that asks for nothing is not judged, it is only remembered: the quiet readings of a
 batch included (`columnar`).
 """
@@ -17,7 +17,7 @@ from app.core.decision.decide import Decision
 from app.core.decision.limits import Zone, nanometres
 from app.core.decision.step import Action
 from app.core.early import acts_early
-from app.core.gain import LONGEST, Opposed, Step, against, expected_scatter, gain_of, opposed
+from app.core.opposite_effect import LONGEST, Opposed, Step, against, expected_scatter, newest_gain, opposed
 from app.core.overshoot import Overshoot, overshoot
 from app.core.still_out import MOST, Judged, still_out
 from app.loop.readings.schemas import ReadingIn
@@ -42,7 +42,7 @@ def remember(stream: PendingStream, sequence: int, decision: Decision, compensat
         stream.parts.append(part_of(sequence, decision, compensated))
 
 
-def pauses(
+def guard_correction(
     pending: PendingWrites, stream: PendingStream, newest: Part | None, reading: ReadingIn, now: datetime
 ) -> PendingAlarm | None:
     """Pause the tool if its corrections do the opposite of what they ask, too much or nothing, or act before they are counted; the alarm.
@@ -102,7 +102,7 @@ def _still_out(stream: PendingStream, parts: Sequence[Part], begin: int) -> Faul
     if found is None:
         return None
     said: dict[str, Any] = found._asdict() | {"deviations": [part.deviation for part in parts[-MOST:]]}
-    if (shown := gain_of(*_sizes(parts), parameters.factor, begin, _scatter(stream))) is not None:
+    if (shown := newest_gain(*_sizes(parts), parameters.factor, begin, _scatter(stream))) is not None:
         said |= {"gain": round(shown[0], 3), "error": round(shown[1], 3)}
     return STILL_OUT, said
 

@@ -1,25 +1,25 @@
-"""Gain of a tool's corrections: what the size did, over what each change of the offset asked of it.
+"""Corrections of opposite effect: the two newest ones are judged before a third goes out.
 
-A correction of ``amount`` asks the size to change by ``-amount / factor`` (`decision.step.effect_of`); a gain of 1 is a size that
-does. A wrong sign makes it -1, a radius taken for a diameter 2 or 1/2, an offset that the control does not use 0. With D the
-deviation of a part and x = -S / factor, S the sum of the corrections it was cut with::
+The gain is what the size did over what each change of the offset asked of it. A correction of ``amount`` asks the size to change by
+``-amount / factor`` (`decision.step.effect_of`); a gain of 1 is a size that does. A wrong sign makes it -1, a radius taken for a
+diameter 2 or 1/2, an offset that the control does not use 0. With D the deviation of a part and x = -S / factor, S the sum of the
+corrections it was cut with::
 
     D_i = w_i + gain x_i,    w_i = level_i + scatter,    level_i+1 = level_i + random step
 
-`opposed` judges the two newest corrections, before a third goes out. One Kalman filter for a level that steps at random foretells
-D and x alike (Harvey 1989, Forecasting, structural time series models and the Kalman filter, sections 2.3 and 7.3). What it misses
-of D over what it misses of x is the gain, a weighted least-squares line::
+One Kalman filter for a level that takes random steps predicts D and x with the same weights (Harvey 1989, Forecasting, structural
+time series models and the Kalman filter, sections 2.3 and 7.3). Its prediction errors of D regressed on those of x, weighted least
+squares, give the gain::
 
     gain = sum(v_D v_x / F) / sum(v_x^2 / F),    error = scatter / sqrt(sum(v_x^2 / F))
 
 over the parts since the first of the two; over those of one correction alone it is the gain of that correction. Parts count by the
-corrections they were cut with, so parts on the way only say more of the level; smaller corrections that answer their scatter
-meanwhile, often against the sense of the two, are in x and are not judged. The scatter is that of the steps from part to part, large
-ones cut off, so wear from part to part is in it, and a chip or an edge that breaks hardly is. While few parts have shown it, it is
-taken for larger, as far as R34 leaves room. The limits below are those with which simulated tool lives are never paused
-(docs/reference/gain.md).
+corrections they were cut with, so parts on the way only add to what is known of the level; smaller corrections that answer their
+scatter meanwhile, often against the sense of the two, are in x and are not judged. The scatter is that of the steps from part to part,
+large ones cut off, so wear from part to part is in it, and a chip or an edge that breaks hardly is. While few parts have shown it, it
+is assumed larger, as far as R34 leaves room. With the limits below no simulated tool life is ever paused (docs/reference/gain.md).
 
-A gain over many corrections, while the machine warms up, is found by `app.core.effect`. Lengths are mm.
+The gain over many corrections, while the machine warms up, is measured by `app.core.measured_gain`. Lengths are mm.
 """
 
 from math import sqrt
@@ -107,7 +107,7 @@ def opposed(
     """The two newest corrections, if what they did is clearly against what they asked.
 
     deviation, compensated: of the newest parts, in order; those before `begin` were cut before a tool change, a manual edit or a
-    resume, and tell of the scatter alone. expected: the scatter to begin with (`expected_scatter`). averaging_limit: R34.
+    resume, and show the scatter alone. expected: the scatter to begin with (`expected_scatter`). averaging_limit: R34.
 
     >>> d, s = np.array([0.005, 0.0103, 0.020]), np.array([0.0, 0.005, 0.0153])
     >>> found = opposed(d, s, 1.0, 0, expected_scatter(0.001, 0.004), 0.004)
@@ -144,7 +144,7 @@ def _step(deviation: Floats, compensated: Floats, factor: float, places: tuple[i
 def overdone(deviation: Floats, compensated: Floats, factor: float, expected: float) -> tuple[float, float] | None:
     """The gain of the two newest corrections and its standard error, if each did many times what it asked.
 
-    An offset that is taken for inches does 25 times as much: R37 holds the third, and there are never enough for `app.core.effect`. By
+    An offset that is taken for inches does 25 times as much: R37 holds the third, and there are never enough for `app.core.measured_gain`. By
     itself the size moves so far where an edge breaks, but not twice in the sense of what was asked. expected: as in `opposed`.
 
     >>> d, s = np.array([0.0015, -0.0366, 0.893]), np.array([0.0, -0.0015, 0.0351])
@@ -296,7 +296,7 @@ def regressed(
     return xx, xd, moved
 
 
-def gain_of(
+def newest_gain(
     deviation: Floats, compensated: Floats, factor: float, begin: int, expected: float
 ) -> tuple[float, float] | None:
     """The gain of all corrections among the newest `RECENT` parts, without a trend, and its standard error.
@@ -304,8 +304,8 @@ def gain_of(
     None where they do not show it: too few or too small corrections, or the size moved by itself. begin, expected: as in `opposed`.
 
     >>> d, s = np.array([0.010, -0.0098, 0.0102, -0.01]), np.array([0.0, -0.01, -0.0002, -0.0104])
-    >>> gain, error = gain_of(d, s, -1.0, 0, 0.0005)
-    >>> round(gain, 2), error < 0.1, gain_of(d, np.zeros(4), -1.0, 0, 0.0005)
+    >>> gain, error = newest_gain(d, s, -1.0, 0, 0.0005)
+    >>> round(gain, 2), error < 0.1, newest_gain(d, np.zeros(4), -1.0, 0, 0.0005)
     (1.98, True, None)
     """
     count = len(deviation)

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from app.core.compiled import plain
 from app.core.decision.step import BELIEVED, CORRECT, step
-from app.core.effect import (
+from app.core.measured_gain import (
     FEWEST_CORRECTIONS,
     FEWEST_READINGS,
     LONGEST,

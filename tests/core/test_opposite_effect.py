@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from app.core.decision.step import BELIEVED, CORRECT, step
-from app.core.gain import overdone
+from app.core.opposite_effect import overdone
 from tests.chance import runs
 from tests.core.tool_lives import OPPOSED, lives, rules_of
 
