@@ -70,7 +70,7 @@ def _fields(plan: Plan) -> dict[str, Any]:
     return fields | {"required_context": [field.value for field in plan.required_context]}
 
 
-def keep(session: Session, machine_id: int, characteristic_id: int) -> None:
+def check_plan(session: Session, machine_id: int, characteristic_id: int) -> None:
     """Look at a plan, put on record what was missed, and raise or end the alarm. Done again it changes nothing.
 
     The machine is locked only where an alarm begins or ends: no reading waits for the rest.
@@ -115,7 +115,7 @@ def keep(session: Session, machine_id: int, characteristic_id: int) -> None:
         publish(session, {"kind": "characteristic", "machine": machine.key, "characteristic": characteristic.key})
 
 
-def keep_context(session: Session, machine_id: int, characteristic_id: int) -> None:
+def check_context(session: Session, machine_id: int, characteristic_id: int) -> None:
     """Look whether the newest readings say what the plan requires of their context; raise the alarm, or end it.
 
     It ends with readings of which none lacks anything. The machine is locked only where there is an alarm.

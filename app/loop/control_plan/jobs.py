@@ -4,7 +4,7 @@ from sqlalchemy import text
 from sqlalchemy.orm import Session
 
 from app.jobs.actions import PeriodicJob, Unit
-from app.loop.control_plan.actions import keep, keep_context
+from app.loop.control_plan.actions import check_context, check_plan
 from app.loop.tables.control_plan import ControlPlan
 
 # Nothing can have been missed where neither this characteristic nor another one of its part had a reading since, nor the control
@@ -42,9 +42,9 @@ def look_at(session: Session, unit: Unit) -> None:
     at = int(unit.key[0]), int(unit.key[1])
     plan = session.get_one(ControlPlan, at).plan
     if plan.asks:
-        keep(session, *at)
+        check_plan(session, *at)
     if plan.required_context:
-        keep_context(session, *at)
+        check_context(session, *at)
 
 
 JOB = PeriodicJob("control_plans", due, look_at)

@@ -279,7 +279,7 @@ def test_one_that_fails_stops_no_other(shop: Shop, other: str, server: Server, m
     cut(shop, other, "A1", "A2")
 
     def fails(session: Any, machine_id: int, characteristic_id: int) -> None:
-        actions.keep(session, machine_id, characteristic_id)
+        actions.check_plan(session, machine_id, characteristic_id)
         if failing == (machine_id, characteristic_id):
             raise RuntimeError("torn cable")
 
@@ -287,7 +287,7 @@ def test_one_that_fails_stops_no_other(shop: Shop, other: str, server: Server, m
         failing = next(
             unit.key for unit in jobs.due(session) if unit.subject == f"characteristic/{shop.characteristic}"
         )
-    monkeypatch.setattr(jobs, "keep", fails)
+    monkeypatch.setattr(jobs, "check_plan", fails)
     assert look(shop) == []
     assert [alarm["kind"] for alarm in neighbour.alarms()] == ["measurement_missed"]
 
