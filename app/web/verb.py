@@ -1,7 +1,7 @@
 """A verb: something a person does to one thing, declared once.
 
-A room declares its verbs. Each is drawn as a page that asks and does (`draw_question`), as a dialog and at a station
-(`Verb.question`, `carry_out`) and as a JSON route (`draw`); the button, the sentence afterwards and the form follow from the
+A room declares its verbs. Each is drawn as a page that asks and does (`add_question_page`), as a dialog and at a station
+(`Verb.question`, `carry_out`) and as a JSON route (`add_json_route`); the button, the sentence afterwards and the form follow from the
 declaration. The role it needs, the savepoint, "somebody was first" and "sent twice" are here and nowhere else.
 """
 
@@ -228,7 +228,7 @@ def ask(
     return page(request, template, refusal=error, question=question, form=form or {}, **context)
 
 
-def draw_question(
+def add_question_page(
     router: APIRouter,
     path: str,
     verbs: Sequence[Verb[On, Any]],
@@ -274,7 +274,7 @@ def draw_question(
     router.post(path)(answer)
 
 
-def draw(
+def add_json_route(
     router: APIRouter,
     path: str,
     verb: Act[On, Any],

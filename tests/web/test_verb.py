@@ -13,7 +13,7 @@ from app.access.callers import Caller
 from app.errors import Conflict, Invalid, NotAllowed, NotFound
 from app.web.api import api_router
 from app.web.fields import Body, Length, Reason
-from app.web.verb import Size, Verb, carry_out, draw, named, said
+from app.web.verb import Size, Verb, add_json_route, carry_out, named, said
 from tests.loops import run
 
 ANA = Caller("person", "ana", "operator")
@@ -158,7 +158,7 @@ def test_a_verb_is_found_by_its_name_where_it_fits() -> None:
 
 def test_the_json_route_has_name_and_text_of_the_act() -> None:
     router = api_router("doors")
-    draw(
+    add_json_route(
         router,
         "/doors/{number}/close",
         CLOSE,

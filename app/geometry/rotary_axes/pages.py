@@ -24,7 +24,7 @@ from app.web.deps import FormDep, Number, SessionDep, Word
 from app.web.fields import LARGEST_ID
 from app.web.paging import address, part_of
 from app.web.templates import page
-from app.web.verb import Outcome, Verb, draw_question
+from app.web.verb import Outcome, Verb, add_question_page
 
 router = APIRouter(include_in_schema=False)
 
@@ -174,7 +174,7 @@ def _after_run(request: Request, on: OfRun, verb: Verb[OfRun, Any], outcome: Out
     return RedirectResponse(f"/kinematics/runs/{on.number}?done={verb.name}", 303)
 
 
-draw_question(
+add_question_page(
     router,
     "/kinematics/runs/{run}/{what}",
     verbs.RUN,
@@ -202,7 +202,7 @@ def _after_restore(request: Request, on: OfBackup, _verb: Verb[OfBackup, Any], o
     return RedirectResponse(machine_url(on.machine.key, head=backup.head, done="restore", n=backup.version), 303)
 
 
-draw_question(
+add_question_page(
     router,
     "/kinematics/machines/{machine}/backups/{version}",
     (verbs.RESTORE,),

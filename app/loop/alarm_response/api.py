@@ -19,7 +19,7 @@ from app.web.deps import SessionDep
 from app.web.fields import LARGEST_ID, Page, ReasonIn, Slug, Text200, answer_from, page_of
 from app.web.limits import takes
 from app.web.pictures import AS_JSON, FILE, PictureIn, decoded, picture_of, served
-from app.web.verb import draw
+from app.web.verb import add_json_route
 
 router = api_router("alarms")
 Number = Annotated[int, Path(description="Number of the alarm.", examples=[41])]
@@ -70,7 +70,7 @@ def _answer(on: OfAlarm, row: AlarmRow) -> AlarmOut:
     return alarm_out(row, Reactions(on.session))
 
 
-draw(router, "/alarms/{alarm}/acknowledge", ACKNOWLEDGE, _alarm, _answer, AlarmOut)
+add_json_route(router, "/alarms/{alarm}/acknowledge", ACKNOWLEDGE, _alarm, _answer, AlarmOut)
 
 
 @router.get("/alarms/{alarm}/photos", responses=problems(404))

@@ -25,7 +25,7 @@ from app.web import paging
 from app.web.deps import FormDep, Number, SessionDep, Sought, Word
 from app.web.forms import typed
 from app.web.templates import page
-from app.web.verb import Outcome, Verb, draw_question
+from app.web.verb import Outcome, Verb, add_question_page
 
 router = APIRouter(include_in_schema=False)
 ON_PAGE = 25
@@ -231,7 +231,7 @@ def _after(request: Request, on: OfPlace, verb: Verb[OfPlace, Any], outcome: Out
     return RedirectResponse(address(on.machine.key, on.place, done=verb.name, n=n), 303)
 
 
-draw_question(
+add_question_page(
     router,
     "/calibration/{machine}/{memory}/{location}/{what}/{number}",
     verbs.PLACE,

@@ -13,7 +13,7 @@ from app.loop.maintenance.verbs import END, EXTEND, OfMaintenance
 from app.web.api import Before, Limit, MachineFilter, api_router, problems
 from app.web.deps import SessionDep
 from app.web.fields import LARGEST_ID, Page, page_of
-from app.web.verb import draw
+from app.web.verb import add_json_route
 
 router = api_router("notifications")
 Number = Annotated[int, Path(ge=1, le=LARGEST_ID, description="Number of the maintenance.", examples=[1])]
@@ -62,7 +62,7 @@ def _maintenance(session: SessionDep, caller: Operator, maintenance: Number) -> 
 
 
 for verb in (EXTEND, END):
-    draw(
+    add_json_route(
         router,
         f"/maintenance/{{maintenance}}/{verb.name}",
         verb,

@@ -21,7 +21,7 @@ from app.web.deps import Before, FormDep, Number, SessionDep, Word
 from app.web.forms import typed
 from app.web.paging import address, part_of
 from app.web.templates import page
-from app.web.verb import Outcome, Verb, draw_question, said
+from app.web.verb import Outcome, Verb, add_question_page, said
 
 router = APIRouter(include_in_schema=False)
 ON_PAGE = 50
@@ -158,7 +158,7 @@ def _ended(_request: Request, on: OfMaintenance, _verb: Verb[OfMaintenance, Any]
     return RedirectResponse(address("/maintenance", done=done, n=on.number), 303)
 
 
-draw_question(
+add_question_page(
     router,
     "/maintenance/{number}/end",
     (END,),

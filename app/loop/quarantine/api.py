@@ -27,7 +27,7 @@ from app.web.api import Before, Limit, MachineFilter, api_router, problems
 from app.web.deps import SessionDep
 from app.web.downloads import download
 from app.web.fields import LARGEST_ID, Page, page_of
-from app.web.verb import draw
+from app.web.verb import add_json_route
 
 router = api_router("alarms")
 AlarmNumber = Annotated[int, Path(description="Number of the alarm.", examples=[41])]
@@ -120,7 +120,7 @@ def _part(session: SessionDep, caller: AnyCaller, quarantine: Number, number: Pa
 
 
 for _verb in PART:
-    draw(
+    add_json_route(
         router,
         f"/quarantines/{{quarantine}}/parts/{{number}}/{_verb.name}",
         _verb,

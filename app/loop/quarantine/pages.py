@@ -22,7 +22,7 @@ from app.web.deps import Before, FormDep, Number, SessionDep, Word
 from app.web.forms import typed
 from app.web.paging import address, part_of
 from app.web.templates import page
-from app.web.verb import Outcome, Verb, draw_question, said
+from app.web.verb import Outcome, Verb, add_question_page, said
 
 router = APIRouter(include_in_schema=False)
 ON_PAGE = 50
@@ -140,7 +140,7 @@ def _decided(_request: Request, on: OfPart, verb: Verb[OfPart, Any], outcome: Ou
     return RedirectResponse(address(f"/quarantines/{on.quarantine}", **done) + f"#part-{on.number}", 303)
 
 
-draw_question(
+add_question_page(
     router,
     "/quarantines/{number}/parts/{part}/{what}",
     verbs.PART,

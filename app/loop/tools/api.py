@@ -37,7 +37,7 @@ from app.web.api import FIGURE, Limit, MachineKey, SerialAfter, Theme, Width, ap
 from app.web.deps import DoorSessionDep, SessionDep
 from app.web.etags import TAGGED, guarded, tagged
 from app.web.fields import Page, page_of
-from app.web.verb import draw
+from app.web.verb import add_json_route
 
 router = api_router("offsets")
 DRAWN = (TOOL_CHANGE, MANUAL_EDIT)  # events of the offset's own chart
@@ -234,7 +234,9 @@ def _decided(on: OfCorrection, done: Decided) -> CorrectionOut:
 
 for _verb in CORRECTION:
     _subject, _asks = (_of_machine, []) if _verb.by_machine else (_of_person, [require(_verb.role)])
-    draw(router, f"/corrections/{{machine}}/{{number}}/{_verb.name}", _verb, _subject, _decided, CorrectionOut, _asks)
+    add_json_route(
+        router, f"/corrections/{{machine}}/{{number}}/{_verb.name}", _verb, _subject, _decided, CorrectionOut, _asks
+    )
 
 
 @router.post("/corrections/{machine}/approve", responses=problems(404, 409))

@@ -20,7 +20,7 @@ from app.loop.tools.verbs import OfAverage, OfCorrection, OfTool
 from app.web.deps import FormDep, Number, SessionDep, Word
 from app.web.paging import address, part_of
 from app.web.templates import page
-from app.web.verb import Outcome, carry_out, draw_question, named
+from app.web.verb import Outcome, add_question_page, carry_out, named
 
 router = APIRouter(include_in_schema=False)
 MOST_IN_QUEUE = 50
@@ -172,10 +172,10 @@ def _astray() -> str:
     return _("Go back to the tool memory.")
 
 
-draw_question(
+add_question_page(
     router, "/machines/{machine}/tools/{number}/{what}", verbs.TOOL, _tool, around=_around, after=_after, astray=_astray
 )
-draw_question(
+add_question_page(
     router,
     "/machines/{machine}/averages/{location}/edit",
     verbs.AVERAGE,
