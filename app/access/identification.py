@@ -27,8 +27,8 @@ from app.access.passwords import hashed, looked_up, matches
 from app.access.tables import Badge, Person
 from app.db.engine import Database
 from app.errors import Conflict, InbandError, Invalid, NotFound, TooManyRequests
+from app.language.formatting import as_read
 from app.language.i18n import _
-from app.language.numbers import as_read
 
 SHORTEST_PIN, LONGEST_PIN = 4, 12
 SHORTEST_BADGE, LONGEST_BADGE = 6, 100

@@ -7,7 +7,7 @@ from itertools import pairwise
 from math import ceil, floor, isfinite, log10
 
 from app.charts.description import Axis, Value
-from app.language.numbers import MINUS
+from app.language.formatting import MINUS
 from app.language.times import plant_zone
 
 NARROW = "\N{NARROW NO-BREAK SPACE}"

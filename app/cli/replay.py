@@ -106,7 +106,7 @@ def _aside(decisions: "Iterable[dict[str, Any] | Flaw]", flaws: "list[Flaw]") ->
 def _table(decisions: Iterable[dict[str, Any]]) -> "Table":
     from rich.table import Table
 
-    from app.language.numbers import um
+    from app.language.formatting import um
 
     table = Table(header_style="bold", pad_edge=False)
     table.add_column(_("No."), justify="right")

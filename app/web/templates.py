@@ -22,7 +22,7 @@ from starlette.responses import HTMLResponse
 from app import HOUSE, __version__
 from app.db.replica import Replica
 from app.errors import InbandError
-from app.language import i18n, numbers, short, times
+from app.language import formatting, i18n, short, times
 from app.web import cards, states, theme, usual_periods
 from app.web.assets import Assets
 from app.web.doors import door_of, machine_of, search_words, way_to
@@ -89,28 +89,28 @@ def environment() -> Environment:
     env.install_gettext_callables(i18n._, i18n.ngettext, newstyle=True)  # type: ignore[attr-defined]
     env.filters.update(
         labelled=cards.labelled,
-        um=numbers.um,
-        read_um=numbers.read_um,
-        read_in_um=numbers.read_in_um,
-        um_limit=numbers.um_limit,
-        tolerance=lambda of: numbers.tolerance_um(of.half, of.natural_limit),
-        mm=numbers.mm,
-        in_um=numbers.in_um,
-        deserved=lambda of, deviation=None: numbers.deserved(of.half, deviation),
-        plain_um=numbers.plain_um,
-        signed=numbers.signed,
-        signed_grouped=numbers.signed_grouped,
-        beside=numbers.beside,
-        fixed=numbers.fixed,
-        probability=numbers.probability,
-        percent=numbers.percent,
-        in_percent=numbers.in_percent,
-        short=numbers.short,
-        grouped=numbers.grouped,
+        um=formatting.um,
+        read_um=formatting.read_um,
+        read_in_um=formatting.read_in_um,
+        um_limit=formatting.um_limit,
+        tolerance=lambda of: formatting.tolerance_um(of.half, of.natural_limit),
+        mm=formatting.mm,
+        in_um=formatting.in_um,
+        deserved=lambda of, deviation=None: formatting.deserved(of.half, deviation),
+        plain_um=formatting.plain_um,
+        signed=formatting.signed,
+        signed_grouped=formatting.signed_grouped,
+        beside=formatting.beside,
+        fixed=formatting.fixed,
+        probability=formatting.probability,
+        percent=formatting.percent,
+        in_percent=formatting.in_percent,
+        short=formatting.short,
+        grouped=formatting.grouped,
         breaking=breaking,
-        when=numbers.when,
+        when=formatting.when,
         as_field=usual_periods.field,
-        ago=numbers.ago,
+        ago=formatting.ago,
         in_short=short.in_short,
     )
     env.globals.update(

@@ -9,8 +9,8 @@ from pydantic import TypeAdapter, ValidationError
 
 from app.core.parameters import LARGEST_LENGTH
 from app.errors import FieldError, Invalid
+from app.language.formatting import as_typed
 from app.language.i18n import _
-from app.language.numbers import as_typed
 
 LENGTHS = {"tip", "tip_radius", "feeler"}  # whose limit is nearer than that of other lengths
 _KIND = re.compile(r"constrained-\w+|literal\[.*\]")  # how pydantic names one of the kinds that a field may be of

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from app.core.spc.capability import CAPABLE, VERY_CAPABLE
 from app.files.documents.content import Value
 from app.files.documents.files.sheets import _shape
-from app.language.numbers import beside, probability
+from app.language.formatting import beside, probability
 from app.quality.capability import wording as capability
 from app.quality.gauge_studies import wording as gauge
 from app.views.overview.ranking import AttentionReason

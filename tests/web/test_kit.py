@@ -6,7 +6,7 @@ import httpx
 import pytest
 
 from app.charts import PALETTES, time_axis
-from app.language import i18n, numbers
+from app.language import formatting, i18n
 from app.language.times import in_zone
 from app.web.assets import FOREVER, STATIC_DIR
 from app.web.templates import assets, environment
@@ -18,32 +18,36 @@ class TestNumbers:
         [(0.0061, "+6.1 µm"), (-0.3, "−300.0 µm"), (0.0, "+0.0 µm"), (-0.00001, "+0.0 µm"), (None, "–")],
     )
     def test_deviations_always_have_their_sign(self, value: float | None, text: str) -> None:
-        assert numbers.um(value).replace("\xa0", " ") == text
+        assert formatting.um(value).replace("\xa0", " ") == text
 
     def test_sizes_have_four_decimals(self) -> None:
-        assert numbers.mm(39.9981).replace("\xa0", " ") == "39.9981 mm"
-        assert numbers.mm(-0.5) == "−0.5000\xa0mm"
+        assert formatting.mm(39.9981).replace("\xa0", " ") == "39.9981 mm"
+        assert formatting.mm(-0.5) == "−0.5000\xa0mm"
 
     def test_limits_have_no_more_decimals_than_they_need(self) -> None:
-        assert [numbers.um_limit(x).replace("\xa0", " ") for x in (0.0053, 0.3, 1.0)] == ["±5.3 µm", "±300 µm", "±1 mm"]
+        assert [formatting.um_limit(x).replace("\xa0", " ") for x in (0.0053, 0.3, 1.0)] == [
+            "±5.3 µm",
+            "±300 µm",
+            "±1 mm",
+        ]
 
     def test_moments_are_those_of_the_plant_and_carry_their_offset(self) -> None:
         moment = datetime(2026, 11, 21, 9, 15, 2, tzinfo=timezone(timedelta(hours=1)))
         with in_zone(ZoneInfo("Asia/Kathmandu")):
-            assert numbers.when(moment) == (
+            assert formatting.when(moment) == (
                 '<time datetime="2026-11-21T14:00:02+05:45" title="Asia/Kathmandu, UTC+05:45">21 Nov 2026 14:00:02</time>'
             )
 
     def test_a_wall_clock_time_that_is_there_twice_has_its_offset(self) -> None:
         with in_zone(ZoneInfo("Europe/Berlin")):
             first = datetime(2026, 10, 25, 0, 30, tzinfo=UTC)
-            assert numbers.when(first, "minutes").striptags() == "25 Oct 2026 02:30 UTC+02:00"
-            assert numbers.when(first + timedelta(hours=1), "minutes").striptags() == "25 Oct 2026 02:30 UTC+01:00"
-            assert numbers.when(first + timedelta(hours=2), "minutes").striptags() == "25 Oct 2026 03:30"
+            assert formatting.when(first, "minutes").striptags() == "25 Oct 2026 02:30 UTC+02:00"
+            assert formatting.when(first + timedelta(hours=1), "minutes").striptags() == "25 Oct 2026 02:30 UTC+01:00"
+            assert formatting.when(first + timedelta(hours=2), "minutes").striptags() == "25 Oct 2026 03:30"
 
     def test_ages_have_one_unit(self) -> None:
         now = datetime(2026, 11, 21, 9, 0, tzinfo=UTC)
-        ages = [numbers.ago(now - timedelta(seconds=s), now).striptags() for s in (12, 200, 90_000, 400_000)]
+        ages = [formatting.ago(now - timedelta(seconds=s), now).striptags() for s in (12, 200, 90_000, 400_000)]
         assert ages == ["12 s ago", "3 min ago", "25 h ago", "4 d ago"]
 
 

@@ -12,8 +12,7 @@ from math import isfinite
 from typing import Any, Literal
 from zoneinfo import ZoneInfo
 
-from app.language.i18n import _
-from app.language.numbers import (
+from app.language.formatting import (
     LEVELS,
     MINUS,
     NO_BREAK_SPACE,
@@ -24,6 +23,7 @@ from app.language.numbers import (
     in_percent,
     signed,
 )
+from app.language.i18n import _
 
 Kind = Literal["text", "count", "deviation", "width", "size", "number", "probability", "share", "moment"]
 LONGEST = 500  # letters of a text in a cell

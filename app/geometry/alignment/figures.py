@@ -12,8 +12,8 @@ import numpy as np
 
 from app.charts import Across, Axis, Chart, Dots, Labels, Mark, Note, Panel, Pen, Role, Room, Series
 from app.core.geometry.points import Floats
+from app.language.formatting import signed
 from app.language.i18n import _
-from app.language.numbers import signed
 
 SEEN = 0.09  # of the part's size: so large the greatest displacement is drawn
 FACING = 0.7  # cosine: so far a face looks along an axis

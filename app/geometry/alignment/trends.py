@@ -6,8 +6,8 @@ from datetime import datetime
 from typing import NamedTuple
 
 from app.charts import Axis, Chart, Dots, Panel, Pen, Room, Series, time_axis
+from app.language.formatting import signed
 from app.language.i18n import _
-from app.language.numbers import signed
 
 PENS = (Pen("ink"), Pen("correction", dash="dash"), Pen("wear", dash="dot"))
 

@@ -6,8 +6,8 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from app.core.geometry.layout import Loose, NotLaidOut
+from app.language.formatting import MINUS, short
 from app.language.i18n import _, ngettext
-from app.language.numbers import MINUS, short
 
 GOOD, WEAK = 10.0, 100.0  # conditions
 WORTH_A_TOUCH = 1.05  # by less, a touch more makes nothing more certain that anybody would see

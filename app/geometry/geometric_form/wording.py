@@ -8,8 +8,8 @@ from app.core.geometry.form import FormKind
 from app.core.geometry.points import Degenerate, Reason
 from app.core.geometry.relations import DatumRefused
 from app.errors import FieldError, Invalid
+from app.language.formatting import NO_BREAK_SPACE, fixed, um
 from app.language.i18n import _
-from app.language.numbers import NO_BREAK_SPACE, fixed, um
 
 
 def kind_word(kind: str) -> str:

@@ -26,8 +26,8 @@ from app.geometry.rotary_axes.answers import parameters_of, said_of
 from app.geometry.rotary_axes.figures import LETTERS, diagram, greatest
 from app.geometry.rotary_axes.queries import RunRow
 from app.geometry.rotary_axes.run_history import in_order, surer
+from app.language.formatting import as_read, short
 from app.language.i18n import _, ngettext
-from app.language.numbers import as_read, short
 from app.language.times import plant_zone
 
 SETTINGS = {

@@ -12,8 +12,8 @@ from app.core.rotary.sphere import NoSphere, SphereFault
 from app.core.warning import CodedWarning
 from app.files.formats.rotary_protocol import Unread
 from app.geometry.rotary_axes.result_values import AXIS_OF, UNITS
+from app.language.formatting import NO_BREAK_SPACE, NOTHING, mm, plain_um, short, signed, um, um_limit
 from app.language.i18n import _, ngettext
-from app.language.numbers import NO_BREAK_SPACE, NOTHING, mm, plain_um, short, signed, um, um_limit
 from app.language.times import in_sentence
 
 if TYPE_CHECKING:

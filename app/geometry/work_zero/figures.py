@@ -9,8 +9,8 @@ from math import hypot
 
 from app.charts import Axis, Chart, Dots, Panel, Pen, Role, Room, Rule, Series, bold, time_axis
 from app.charts import Mark as Drawn
+from app.language.formatting import um
 from app.language.i18n import _
-from app.language.numbers import um
 
 SYMBOLS = {"x": "circle", "y": "square", "z": "diamond"}
 TONES: dict[str, Role] = {"x": "ink", "y": "steady", "z": "quiet"}

@@ -8,8 +8,8 @@ from typing import Any
 from app.core.geometry.edges import Problem, Unfit
 from app.core.geometry.points import Degenerate, Reason
 from app.core.geometry.work_zero import MOST_TURNED, Notice, Shift
+from app.language.formatting import fixed, mm, signed, um
 from app.language.i18n import _, ngettext
-from app.language.numbers import fixed, mm, signed, um
 
 MICROMETRES_UP_TO = 10.0  # mm
 

@@ -3,8 +3,8 @@
 from collections.abc import Sequence
 from typing import Any
 
+from app.language.formatting import mm, read_um
 from app.language.i18n import _, ngettext
-from app.language.numbers import mm, read_um
 from app.loop.alarms.kinds import kinds
 
 MOST_NUMBERS = 5  # in one sentence

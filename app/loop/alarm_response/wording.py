@@ -3,8 +3,8 @@
 import logging
 from collections.abc import Sequence
 
+from app.language.formatting import read_um
 from app.language.i18n import _, ngettext
-from app.language.numbers import read_um
 from app.language.times import in_sentence
 from app.loop.alarm_response.queries import AlarmRow
 from app.loop.alarms.kinds import kind_named

@@ -7,8 +7,8 @@ from sqlalchemy import select
 from sqlalchemy.orm import object_session
 
 from app.core.probing import TouchError
+from app.language.formatting import NOTHING, age, as_read, read_um, tolerance_um
 from app.language.i18n import _
-from app.language.numbers import NOTHING, age, as_read, read_um, tolerance_um
 from app.loop.alarms.kinds import AlarmKind, register
 from app.loop.readings.wording import first_move_sentence, touch_problem
 from app.loop.tables.alarms import Alarm

@@ -24,8 +24,8 @@ from app.charts import (
     time_axis,
 )
 from app.charts import Mark as Drawn
+from app.language.formatting import um
 from app.language.i18n import _
-from app.language.numbers import um
 
 SYMBOLS = {
     "unchanged": "circle",

@@ -5,8 +5,8 @@ from typing import Any
 
 from app.core.calibration import SECTIONS
 from app.errors import Invalid
+from app.language.formatting import as_typed
 from app.language.i18n import _
-from app.language.numbers import as_typed
 from app.loop.calibration.places import PlaceRow
 from app.loop.calibration.schemas import GaugeIn, PairIn, RingIn, RingSectionIn
 from app.web.forms import BETWEEN, by_field, lengths, read, typed, whole

@@ -3,8 +3,8 @@
 from collections.abc import Iterator, Mapping
 from typing import Any, NamedTuple
 
+from app.language.formatting import NOTHING, mm, short, um
 from app.language.i18n import _
-from app.language.numbers import NOTHING, mm, short, um
 from app.loop.characteristics.wording import label
 from app.loop.tables.calibration import CalibrationRecord
 

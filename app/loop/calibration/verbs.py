@@ -8,8 +8,8 @@ from sqlalchemy.orm import Session
 
 from app.access.callers import Caller
 from app.errors import NotFound
+from app.language.formatting import mm, signed_mm, um
 from app.language.i18n import _, ngettext
-from app.language.numbers import mm, signed_mm, um
 from app.loop.calibration import actions, pairs, queries, wording
 from app.loop.calibration.queries import CalibrationRow, Place
 from app.loop.calibration.schemas import SuggestionAcceptIn

@@ -9,8 +9,8 @@ from app.core.calibration import Outcome
 from app.core.decision.step import rounded
 from app.core.pairs import Comparison
 from app.core.warning import CodedWarning, of_stored
+from app.language.formatting import mm, signed_mm, um, um_limit
 from app.language.i18n import _, ngettext
-from app.language.numbers import mm, signed_mm, um, um_limit
 from app.language.times import in_sentence
 from app.loop.warnings.wording import sentence as coded
 

@@ -7,8 +7,8 @@ from typing import Any, NamedTuple, Protocol, TypeVar
 from app.core.decision.limits import nanometres
 from app.core.parameters import BY_NAME, TWO_POINT_SWITCH, Field, FieldKind, Problem, Variant, mean_nominal
 from app.errors import FieldError
+from app.language.formatting import typed_length
 from app.language.i18n import _, ngettext
-from app.language.numbers import typed_length
 from app.web.warnings import WarningOut
 
 

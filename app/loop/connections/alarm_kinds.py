@@ -4,8 +4,8 @@ from collections.abc import Callable, Mapping
 from datetime import datetime
 from typing import Any
 
+from app.language.formatting import NOTHING, as_read
 from app.language.i18n import _, ngettext
-from app.language.numbers import NOTHING, as_read
 from app.loop.alarms.kinds import AlarmKind, register
 from app.loop.tables.alarms import Alarm
 

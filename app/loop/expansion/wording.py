@@ -1,8 +1,8 @@
 """Sentences about sizes at 20 °C."""
 
 from app.core.temperature import HIGHEST, LOWEST, AtReference, Missing
+from app.language.formatting import plain_um, short, um
 from app.language.i18n import _
-from app.language.numbers import plain_um, short, um
 
 
 def at_20_words(found: AtReference | Missing) -> str:

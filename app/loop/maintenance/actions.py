@@ -9,8 +9,8 @@ from app.access.audit.actions import record
 from app.access.callers import Caller
 from app.db.events import publish
 from app.errors import Conflict, Invalid, NotAllowed
+from app.language.formatting import as_read
 from app.language.i18n import _
-from app.language.numbers import as_read
 from app.loop.machines.queries import machine_named
 from app.loop.maintenance import queries
 from app.loop.maintenance.queries import MaintenanceRow

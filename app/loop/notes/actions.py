@@ -11,8 +11,8 @@ from app.access.audit.actions import record
 from app.access.callers import Caller
 from app.db.events import publish
 from app.errors import Conflict, Invalid, NotAllowed, NotFound
+from app.language.formatting import as_read
 from app.language.i18n import _
-from app.language.numbers import as_read
 from app.loop.characteristics.queries import CurrentCharacteristic, characteristic_named
 from app.loop.machines.queries import machine_named
 from app.loop.notes import queries

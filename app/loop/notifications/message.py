@@ -5,8 +5,8 @@ from collections.abc import Collection, Mapping, Sequence
 from datetime import datetime
 from typing import Any
 
+from app.language.formatting import as_read
 from app.language.i18n import _, ngettext
-from app.language.numbers import as_read
 from app.loop.alarm_response import wording
 from app.loop.alarm_response.queries import AlarmRow
 from app.loop.alarm_response.reaction_queries import Reactions

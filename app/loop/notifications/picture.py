@@ -11,7 +11,7 @@ from sqlalchemy.orm import Session
 
 from app.core.decision.limits import Zone, within_tolerance
 from app.core.parameters import Parameters
-from app.language.numbers import read_um
+from app.language.formatting import read_um
 from app.loop.alarm_response.queries import AlarmRow
 from app.loop.characteristics.queries import parameters_of
 from app.loop.tables.readings import Reading

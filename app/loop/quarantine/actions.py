@@ -13,8 +13,8 @@ from app.core.affected import in_tolerance
 from app.core.decision.step import rounded
 from app.db.events import publish
 from app.errors import Conflict, Invalid
+from app.language.formatting import as_read, um
 from app.language.i18n import _
-from app.language.numbers import as_read, um
 from app.loop.characteristics.queries import characteristic_named
 from app.loop.quarantine import queries, wording
 from app.loop.quarantine.queries import Listed, PartRow, QuarantineRow

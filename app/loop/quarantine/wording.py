@@ -1,7 +1,7 @@
 """Words of quarantines and affected parts."""
 
+from app.language.formatting import as_read
 from app.language.i18n import _
-from app.language.numbers import as_read
 from app.loop.quarantine.history import Known
 from app.loop.quarantine.queries import Between
 from app.loop.quarantine.tables import QuarantinedPart

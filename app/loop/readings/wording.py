@@ -11,8 +11,8 @@ from app.core.decision.step import Action, Code, average_of
 from app.core.parameters import Feature, Parameters
 from app.core.plausibility import looks_like_inches, looks_like_micrometres
 from app.core.probing import TouchError, Touches, measured_value
+from app.language.formatting import age, decimals_beside, deserved, fixed, signed
 from app.language.i18n import _, ngettext
-from app.language.numbers import age, decimals_beside, deserved, fixed, signed
 from app.loop.readings.records import MOST_OUTSTANDING, Record
 
 NAMED_AT_MOST = 3

@@ -11,8 +11,8 @@ from app.core.spc.rules import Rule, RuleKind, RuleName, Run
 from app.core.spc.shewhart import Chart
 from app.core.spc.spread import Estimator
 from app.files.documents.content import Fact, count, deviation, share, width
+from app.language.formatting import plain_um, um
 from app.language.i18n import _, ngettext
-from app.language.numbers import plain_um, um
 from app.loop.readings.wording import field_word
 from app.loop.summaries.queries import Numbers, Rejects, Unworn
 

@@ -12,8 +12,8 @@ from math import inf
 from typing import Literal
 
 from app.charts import Axis, Bars, Chart, Dots, Note, Panel, Pen, Role, Rule, Series
+from app.language.formatting import as_read
 from app.language.i18n import _
-from app.language.numbers import as_read
 from app.language.times import plant_zone
 from app.web.theme import ZONE_SYMBOLS
 

@@ -15,8 +15,8 @@ from sqlalchemy.orm import Session
 from app.charts import Chart
 from app.core.period import Period
 from app.db.period import in_period
+from app.language.formatting import grouped
 from app.language.i18n import _
-from app.language.numbers import grouped
 from app.loop.alarms.kinds import kind_named
 from app.loop.characteristics.queries import CurrentCharacteristic
 from app.loop.notes.queries import on_charts_of

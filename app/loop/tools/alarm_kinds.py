@@ -2,8 +2,8 @@
 
 from datetime import datetime
 
+from app.language.formatting import as_read, mm, um, um_limit
 from app.language.i18n import _, ngettext
-from app.language.numbers import as_read, mm, um, um_limit
 from app.loop.alarms.kinds import AlarmKind, register
 from app.loop.alarms.reading_kinds import uncorrected
 from app.loop.tables.alarms import Alarm

@@ -9,8 +9,8 @@ from starlette.responses import RedirectResponse
 
 from app.access.deps import Operator, require
 from app.errors import Invalid
+from app.language.formatting import as_typed
 from app.language.i18n import _
-from app.language.numbers import as_typed
 from app.loop.machines.queries import machine_named
 from app.loop.tools import queries, verbs, wording
 from app.loop.tools.edge_schemas import ToolSettings

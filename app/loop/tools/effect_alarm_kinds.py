@@ -2,8 +2,8 @@
 
 from datetime import datetime
 
+from app.language.formatting import PLUS_MINUS, age, as_read, fixed, signed, um
 from app.language.i18n import _
-from app.language.numbers import PLUS_MINUS, age, as_read, fixed, signed, um
 from app.loop.alarms.kinds import AlarmKind, register
 from app.loop.alarms.reading_kinds import called, moved_by, uncorrected
 from app.loop.tables.alarms import Alarm

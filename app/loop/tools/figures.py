@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from datetime import datetime
 
 from app.charts import Axis, Bars, Chart, Dots, Mark, Panel, Pen, Room, Rule, Series, bold, nothing, time_axis
+from app.language.formatting import um
 from app.language.i18n import _
-from app.language.numbers import um
 from app.language.times import local
 
 SYMBOLS = {"correction": "circle", "edit": "square", "change": "triangle-down", "reported": "diamond"}

@@ -8,8 +8,8 @@ from sqlalchemy.orm import Session
 
 from app.access.callers import Caller
 from app.core.plausibility import offset_warnings
+from app.language.formatting import mm, read_um, typed_length, um
 from app.language.i18n import _, ngettext
-from app.language.numbers import mm, read_um, typed_length, um
 from app.loop.characteristics.correction_queries import open_corrections
 from app.loop.tables.machines import Machine
 from app.loop.tools import actions, applying, queries, sister_actions, wording

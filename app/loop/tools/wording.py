@@ -3,8 +3,8 @@
 from collections.abc import Callable
 from datetime import UTC, datetime
 
+from app.language.formatting import NOTHING, PLUS_MINUS, age, fixed, mm, um
 from app.language.i18n import _, ngettext
-from app.language.numbers import NOTHING, PLUS_MINUS, age, fixed, mm, um
 from app.language.times import in_sentence
 from app.loop.tables.tools import COUNTED_LATE, NO_HELP, OPPOSED, OVERSHOT, Correction
 from app.loop.tools.gain_queries import ToolGain

@@ -4,8 +4,8 @@ from collections.abc import Sequence
 from typing import Any
 
 from app.core.warning import CodedWarning
+from app.language.formatting import PLUS_MINUS, mm, signed, um
 from app.language.i18n import _
-from app.language.numbers import PLUS_MINUS, mm, signed, um
 
 
 def sentence(warning: CodedWarning) -> str:

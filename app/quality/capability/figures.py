@@ -29,8 +29,8 @@ from app.core.spc.capability import CAPABLE, VERY_CAPABLE, Limits
 from app.core.spc.fitting import Fitted, density
 from app.core.spc.outliers import far_off
 from app.core.spc.refusal import Floats
+from app.language.formatting import signed
 from app.language.i18n import _, ngettext
-from app.language.numbers import signed
 from app.language.times import plant_zone
 from app.quality.capability import fit_wording
 from app.quality.capability.kinds import Week

@@ -2,8 +2,8 @@
 
 from app.core.spc.distributions import Family
 from app.core.spc.fitting import FITS, Choice, Fit, Fitted, why
+from app.language.formatting import fixed, in_percent, signed
 from app.language.i18n import _
-from app.language.numbers import fixed, in_percent, signed
 
 
 def name(family: Family) -> str:

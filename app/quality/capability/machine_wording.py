@@ -3,8 +3,8 @@
 from app.core.spc.capability import VERY_CAPABLE
 from app.core.spc.refusal import Refused
 from app.core.spc.tolerance_interval import Method, ToleranceInterval
+from app.language.formatting import fixed, signed
 from app.language.i18n import _
-from app.language.numbers import fixed, signed
 from app.loop.summaries import wording as statistics
 from app.quality.capability import fit_wording
 from app.quality.capability.machine_queries import LOOKED_AT, Run

@@ -1,8 +1,8 @@
 """Sentences about the strata of a capability study."""
 
 from app.core.spc.strata import Difference, NoAnswer
+from app.language.formatting import plain_um
 from app.language.i18n import _, ngettext
-from app.language.numbers import plain_um
 from app.quality.capability.strata_queries import StrataStudy
 from app.quality.capability.wording import p_value
 

@@ -11,8 +11,8 @@ from app.core.spc.quoting import Quoting, WhyNot
 from app.core.spc.refusal import Reason, Refused
 from app.core.spc.spread import Estimator
 from app.core.spc.stability import Fired, Stability
+from app.language.formatting import beside, grouped, probability, signed, tolerance_um
 from app.language.i18n import _, ngettext
-from app.language.numbers import beside, grouped, probability, signed, tolerance_um
 from app.loop.summaries import wording as statistics
 from app.loop.summaries.wording import context_words
 from app.quality.capability import fit_wording as fits

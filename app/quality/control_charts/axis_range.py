@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 
 from app.charts import Dots, Labels, Series
 from app.core.spc.shewhart import Chart
+from app.language.formatting import NO_BREAK_SPACE, signed
 from app.language.i18n import _
-from app.language.numbers import NO_BREAK_SPACE, signed
 from app.quality.control_charts.view import View
 
 ROOM = 0.08

@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 from app.charts import Axis, Chart, Dots, Ground, Note, Panel, Pen, Room, Rule, Series, Share, nothing, reading_axis
 from app.core.spc.rules import Signals
 from app.core.spc.shewhart import Chart as Shewhart
+from app.language.formatting import signed
 from app.language.i18n import _
-from app.language.numbers import signed
 from app.quality.control_charts.axis_range import UNSIGNED, beyond, reach
 from app.quality.control_charts.downsampling import thinned
 from app.quality.control_charts.view import Marks, View

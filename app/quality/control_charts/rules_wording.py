@@ -5,8 +5,8 @@ from typing import Any
 from app.core.spc.false_alarms import LONGEST, FalseAlarms
 from app.core.spc.rules import RULES, RuleName
 from app.core.spc.shewhart import Chart
+from app.language.formatting import grouped
 from app.language.i18n import _, ngettext
-from app.language.numbers import grouped
 from app.loop.summaries import wording as statistics
 from app.quality.control_charts.monitoring import Do, Place, Rules
 from app.quality.control_charts.rules_queries import RuleTrial

@@ -8,8 +8,8 @@ from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
 from app.errors import FieldError, Invalid
+from app.language.formatting import as_typed
 from app.language.i18n import _
-from app.language.numbers import as_typed
 from app.quality.gauge_studies import table_reader
 from app.quality.gauge_studies.table_reader import Unreadable, number
 from app.web.forms import length

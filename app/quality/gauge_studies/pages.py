@@ -11,8 +11,8 @@ from starlette.responses import RedirectResponse
 from app.access.deps import Engineer, Operator, Viewer
 from app.core.spc.refusal import Refused
 from app.errors import Conflict, FieldError, InbandError, Invalid, NotFound
+from app.language.formatting import as_typed
 from app.language.i18n import _
-from app.language.numbers import as_typed
 from app.loop.characteristics import queries as characteristics
 from app.loop.machines import queries as machines
 from app.loop.warnings.wording import sentence

@@ -14,8 +14,8 @@ from app.files.formats.cell_values import Unreadable as WrongUnit
 from app.files.formats.column_names import NAMES, key_of
 from app.files.formats.number_with_unit import agreed_unit, in_mm, number_and_unit
 from app.files.formats.units import LENGTHS, UnknownUnit, beside, unit_in
+from app.language.formatting import as_typed
 from app.language.i18n import _
-from app.language.numbers import as_typed
 
 MOST_CHARACTERS = 400_000
 _PARTS = {*map(key_of, NAMES["part"]), "parts", "teile", "delovi", "kosi", "sample"}

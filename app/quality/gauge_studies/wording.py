@@ -9,8 +9,8 @@ from app.core.spc.gauge.crossed import POOLED_ABOVE, AnovaRow, Study
 from app.core.spc.gauge.linearity import Linearity
 from app.core.spc.gauge.single import Bias, TypeOne
 from app.core.spc.refusal import Refused
+from app.language.formatting import beside, decimals_beside, fixed, plain_um, probability, signed
 from app.language.i18n import _, ngettext
-from app.language.numbers import beside, decimals_beside, fixed, plain_um, probability, signed
 from app.loop.summaries import wording as statistics
 from app.quality.capability import wording as capabilities
 from app.quality.gauge_studies.evaluation import Evaluation

@@ -4,8 +4,8 @@ from app.core.drift import Column, Drift
 from app.core.regression import INFLATED, Effect, LeftOut
 from app.core.spc.refusal import Reason, Refused
 from app.core.temperature import HIGHEST, LOWEST
+from app.language.formatting import NO_BREAK_SPACE, fixed, percent, plain_um, short, signed
 from app.language.i18n import _, ngettext
-from app.language.numbers import NO_BREAK_SPACE, fixed, percent, plain_um, short, signed
 from app.loop.summaries.wording import refusal
 from app.quality.temperature.queries import Study
 

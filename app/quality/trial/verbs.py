@@ -9,8 +9,8 @@ from sqlalchemy.orm import Session
 from app.access.callers import Caller
 from app.core.parameters import Mode
 from app.errors import Conflict, Invalid
+from app.language.formatting import um_limit
 from app.language.i18n import _
-from app.language.numbers import um_limit
 from app.loop.characteristics.actions import CharacteristicChange, change_characteristic
 from app.loop.characteristics.queries import CurrentCharacteristic, characteristic_named
 from app.quality.trial.queries import Settings

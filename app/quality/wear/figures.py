@@ -33,8 +33,8 @@ from app.core import forecast
 from app.core.forecast import PUBLIC_WIDENING, Forecast
 from app.core.natural import NaturalLimit, tolerance_about_target
 from app.core.wear import Fit, Towards
+from app.language.formatting import um
 from app.language.i18n import _
-from app.language.numbers import um
 from app.quality.wear.wording import parts_left, per_part, towards_name
 
 AHEAD, LEAST_AHEAD = 0.6, 20  # how far the forecast is drawn at most, in shares of what is shown; in parts

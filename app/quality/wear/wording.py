@@ -9,8 +9,8 @@ from app.core.hunting import GOAL, Hunting, LoopVerdict, Remedy
 from app.core.natural import half_width
 from app.core.parameters import Parameters
 from app.core.wear import FEWEST, Fit, Towards
+from app.language.formatting import NO_BREAK_SPACE, grouped, percent, plain_um, signed
 from app.language.i18n import _, ngettext
-from app.language.numbers import NO_BREAK_SPACE, grouped, percent, plain_um, signed
 
 FAR = 10_000  # parts: further ahead nobody plans, and nothing goes on as it is
 

@@ -9,8 +9,8 @@ from app.core.context import ContextField
 from app.core.parameters import Parameters
 from app.core.period import Period
 from app.files.formats import cell_values, periods
+from app.language.formatting import short
 from app.language.i18n import _
-from app.language.numbers import short
 from app.language.times import plant_zone
 from app.quality.what_if.queries import USUAL
 from app.quality.what_if.schemas import MapIn, WhatIfIn

@@ -4,8 +4,8 @@ from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
 from app.core.policy_map import Criterion, value_of
+from app.language.formatting import short
 from app.language.i18n import _
-from app.language.numbers import short
 from app.quality.what_if import form_reader, map_axes, wording
 from app.quality.what_if.queries import Cell, Map, Simulation
 

@@ -13,8 +13,8 @@ from app.access.deps import Caller, Operator, Viewer, require
 from app.core.context import ContextField
 from app.core.policy_map import Criterion
 from app.errors import Conflict, InbandError, Invalid, TooManyRequests
+from app.language.formatting import short
 from app.language.i18n import _
-from app.language.numbers import short
 from app.loop.characteristics import queries as characteristics
 from app.loop.characteristics.queries import CurrentCharacteristic
 from app.loop.machines import queries as machines

@@ -10,8 +10,8 @@ from app.core.parameters import BY_NAME
 from app.core.policy_map import Criterion, room, value_of
 from app.core.replay import Figures
 from app.core.spc.refusal import Reason, Refused
+from app.language.formatting import NO_BREAK_SPACE, NOTHING, fixed, percent, plain_um, short, signed, um
 from app.language.i18n import _, ngettext
-from app.language.numbers import NO_BREAK_SPACE, NOTHING, fixed, percent, plain_um, short, signed, um
 from app.loop.characteristics.wording import label
 from app.quality.capability import wording as capability
 from app.quality.capability.wording import named

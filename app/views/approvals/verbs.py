@@ -5,8 +5,8 @@ from dataclasses import dataclass
 from typing import Any
 
 from app.errors import NotFound
+from app.language.formatting import mm, read_um
 from app.language.i18n import _, ngettext
-from app.language.numbers import mm, read_um
 from app.loop.tables.tools import Correction
 from app.loop.tools import actions, queries
 from app.loop.tools.schemas import DecisionsIn

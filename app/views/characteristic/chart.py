@@ -15,8 +15,8 @@ from app import charts
 from app.core.context import Chosen, ContextField
 from app.core.decision.limits import Zone, classify
 from app.core.temperature import AtReference, at_reference
+from app.language.formatting import grouped
 from app.language.i18n import _
-from app.language.numbers import grouped
 from app.loop.characteristics.queries import CurrentCharacteristic, parameters_of
 from app.loop.expansion.queries import expansion_of, temperatures_between
 from app.loop.readings import queries as readings

@@ -8,8 +8,8 @@ from markupsafe import Markup, escape
 
 from app.core.decision.limits import HasLimits, Limits, classify, within_tolerance
 from app.core.natural import half_of, natural_of, tolerance_about_target
+from app.language.formatting import read_um, um_limit
 from app.language.i18n import _
-from app.language.numbers import read_um, um_limit
 from app.views.characteristic.figures.labels import judged_sides
 from app.views.characteristic.figures.scale import ZoneScale, bands, ends_of
 from app.web.states import tone_of

@@ -3,8 +3,8 @@
 from typing import NamedTuple
 
 from app.core.state import CharacteristicState
+from app.language.formatting import read_um
 from app.language.i18n import _
-from app.language.numbers import read_um
 from app.views.characteristic.state_queries import CharacteristicRow
 
 

@@ -24,8 +24,8 @@ from app.charts import (
     time_axis,
 )
 from app.core.natural import NaturalLimit, Tolerance, tolerance_about_target
+from app.language.formatting import tolerance_um, um
 from app.language.i18n import _
-from app.language.numbers import tolerance_um, um
 
 ROOM = Room(84, 72)  # at the right for the tolerance
 BETWEEN = 0.05  # of the height, above each panel, for its name

@@ -12,8 +12,8 @@ from sqlalchemy.orm import Session
 from app.core.context import ContextField
 from app.core.period import Period
 from app.errors import Invalid
+from app.language.formatting import as_read
 from app.language.i18n import _
-from app.language.numbers import as_read
 from app.language.times import local
 from app.loop.characteristics import queries as characteristics
 from app.loop.characteristics.queries import CurrentCharacteristic

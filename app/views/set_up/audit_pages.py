@@ -12,8 +12,8 @@ from app.access import devices
 from app.access.audit import queries
 from app.access.deps import Engineer
 from app.core.parameters import BY_NAME, Field, FieldKind
+from app.language.formatting import as_read
 from app.language.i18n import _
-from app.language.numbers import as_read
 from app.loop.characteristics.wording import choice, label
 from app.views.set_up.frame import setup_page
 from app.web.deps import SessionDep

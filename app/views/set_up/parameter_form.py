@@ -12,8 +12,8 @@ from app.core.number_text import number_or_none, plain
 from app.core.parameters import BY_NAME, FIELDS, Field, FieldKind, default_averaging_limit, mean_nominal
 from app.core.programs.lines import written
 from app.core.suggested import suggested_limits
+from app.language.formatting import short, um_limit
 from app.language.i18n import _
-from app.language.numbers import short, um_limit
 from app.loop.characteristics.wording import choice, explanation, label, order_sentence
 
 __all__ = ["choice", "diagram", "parameters_from", "sentences", "typed_defaults", "typed_from", "typed_partly"]

@@ -7,8 +7,8 @@ from urllib.parse import urlencode
 from sqlalchemy.orm import Session
 
 from app.core.spc.capability import CAPABLE
+from app.language.formatting import age, as_read, fixed, plain_um
 from app.language.i18n import _, ngettext
-from app.language.numbers import age, as_read, fixed, plain_um
 from app.loop.alarm_response.wording import kind_word
 from app.views.shift import queries
 from app.views.shift.queries import Shift

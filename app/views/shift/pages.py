@@ -8,7 +8,7 @@ from fastapi import APIRouter, Query, Request, Response
 from app.access.deps import require
 from app.errors import Invalid
 from app.files.formats import cell_values, periods
-from app.language.numbers import age
+from app.language.formatting import age
 from app.language.times import begin_of_shift, plant_zone
 from app.loop.alarm_response import wording
 from app.loop.machines import queries as machines

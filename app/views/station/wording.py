@@ -1,7 +1,7 @@
 """The next action at a machine, in words that are short enough to be read from two metres."""
 
+from app.language.formatting import read_um
 from app.language.i18n import _
-from app.language.numbers import read_um
 from app.views.characteristic import wording
 from app.views.station.queries import Station
 

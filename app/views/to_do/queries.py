@@ -15,8 +15,8 @@ from sqlalchemy.orm import Session, aliased
 from app.access.callers import Caller, Role
 from app.jobs.tables import JobFailure
 from app.jobs.wording import job_word
+from app.language.formatting import read_um
 from app.language.i18n import _, ngettext
-from app.language.numbers import read_um
 from app.loop.alarm_response import queries as alarms
 from app.loop.alarm_response import wording
 from app.loop.alarms.reading_kinds import HOLDING

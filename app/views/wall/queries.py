@@ -7,8 +7,8 @@ from typing import NamedTuple
 from sqlalchemy.orm import Session
 
 from app.core.state import CharacteristicState
+from app.language.formatting import as_read
 from app.language.i18n import _
-from app.language.numbers import as_read
 from app.loop.alarm_response import queries as responses
 from app.loop.alarm_response import wording as alarm_wording
 from app.loop.maintenance.queries import MaintenanceRow, running

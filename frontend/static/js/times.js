@@ -4,7 +4,7 @@
 //
 // Without script the server's words stay.
 
-// One unit, no more: read from two metres away. The symbols are those of app/language/numbers.py.
+// One unit, no more: read from two metres away. The symbols are those of app/language/formatting.py.
 export function age(seconds) {
   if (seconds < 60) return `${Math.max(0, Math.floor(seconds))} s`;
   if (seconds < 3600) return `${Math.floor(seconds / 60)} min`;

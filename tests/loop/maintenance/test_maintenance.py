@@ -7,7 +7,7 @@ from zoneinfo import ZoneInfo
 import pytest
 
 from app.errors import Invalid
-from app.language.numbers import as_read
+from app.language.formatting import as_read
 from app.language.times import in_zone
 from app.loop.maintenance.pages import as_typed
 from app.loop.maintenance.schemas import MaintenanceIn

@@ -6,7 +6,7 @@ from typing import Any
 import pytest
 from playwright.sync_api import Page, expect
 
-from app.language.numbers import um
+from app.language.formatting import um
 from tests.pages.looks import boxes
 from tests.shop import PARAMETERS, Person, Shop, unique
 

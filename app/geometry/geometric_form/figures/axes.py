@@ -5,8 +5,8 @@ from typing import Any
 
 from app.charts import Axis, Chart, Dots, Labels, Mark, Note, Panel, Pen, Series, Share
 from app.geometry.geometric_form.figures.parts import ROOM, circle, rounded_up
+from app.language.formatting import signed
 from app.language.i18n import _
-from app.language.numbers import signed
 
 
 def axis_figure(

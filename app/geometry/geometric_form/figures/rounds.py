@@ -6,8 +6,8 @@ from typing import Any
 
 from app.charts import Axis, Chart, Dots, Labels, Mark, Note, Panel, Pen, Room, Series, Share
 from app.geometry.geometric_form.figures.parts import circle, rounded_up
+from app.language.formatting import signed
 from app.language.i18n import _
-from app.language.numbers import signed
 
 DEEP = 0.32  # of the radius in the picture, that the greatest deviation takes
 BESIDE = 0.09  # of the radius: where the number of a touch stands

@@ -6,8 +6,8 @@ from typing import Any
 
 from app.charts import Axis, Chart, Colour, Dots, Labels, Panel, Pen, Series, Shades
 from app.geometry.geometric_form.figures.parts import ROOM
+from app.language.formatting import signed
 from app.language.i18n import _
-from app.language.numbers import signed
 
 MOST_NAMES = 60
 

@@ -20,8 +20,8 @@ from app.core.parameters import LARGEST_LENGTH, Parameters, Variant
 from app.core.plausibility import is_doubtful, looks_like_inches
 from app.db.engine import Database
 from app.errors import FieldError, Invalid
+from app.language.formatting import short, um_limit
 from app.language.i18n import _
-from app.language.numbers import short, um_limit
 from app.loop.characteristics import queries as characteristics
 from app.loop.readings import queries as readings
 from app.loop.readings.records import Entry

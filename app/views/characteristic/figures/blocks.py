@@ -8,8 +8,8 @@ from datetime import datetime
 
 from app.charts import Dots, Faded, Pen, Series, band, bold
 from app.core.decision.limits import Limits, classify
+from app.language.formatting import grouped, um
 from app.language.i18n import _
-from app.language.numbers import grouped, um
 from app.web.theme import ZONE_SYMBOLS, zone_name, zone_role
 
 BETWEEN, EDGE = Faded("steady", 0.28), Faded("steady", 0.5)  # the smallest to the largest reading, and its edges

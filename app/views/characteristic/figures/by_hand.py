@@ -6,8 +6,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from app.charts import Dots, Series, bold
+from app.language.formatting import um
 from app.language.i18n import _
-from app.language.numbers import um
 from app.views.characteristic.figures.scale import Scale
 
 

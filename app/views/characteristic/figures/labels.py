@@ -5,8 +5,8 @@ from __future__ import annotations
 from app.charts import BANDS, Ground, Note, Pen, Role, Rule, Share
 from app.core.decision.limits import HasLimits
 from app.core.natural import NaturalLimit, half_of, tolerance_about_target
+from app.language.formatting import MINUS, NO_BREAK_SPACE, NOTHING, um_limit
 from app.language.i18n import _
-from app.language.numbers import MINUS, NO_BREAK_SPACE, NOTHING, um_limit
 from app.views.characteristic.figures.scale import Band, Scale, ZoneScale, bands, ends_of
 
 # In the linear scale close limits would write over each other: the least distance as a share of the whole height.

@@ -6,8 +6,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from app.charts import Dots, Note, Pen, Role, Series, Share, bold
+from app.language.formatting import read_um
 from app.language.i18n import _
-from app.language.numbers import read_um
 from app.loop.timeline.figures import TOOL_CHANGE, Event
 from app.loop.tools.wording import status_word
 

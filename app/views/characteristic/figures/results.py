@@ -6,8 +6,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from app.charts import Axis, Chart, Dots, Mark, Panel, Pen, Room, Series, band, bold, empty
+from app.language.formatting import NO_BREAK_SPACE, signed
 from app.language.i18n import _
-from app.language.numbers import NO_BREAK_SPACE, signed
 from app.views.characteristic.figures.blocks import BETWEEN, EDGE, block_words
 
 SIGNED = frozenset({"taper"})  # the others are sizes without a sign

@@ -6,8 +6,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from app.core.decision.limits import nanometres
+from app.language.formatting import mm, um
 from app.language.i18n import _
-from app.language.numbers import mm, um
 
 
 @dataclass(frozen=True)

@@ -12,8 +12,8 @@ from markupsafe import Markup, escape
 
 from app.core.parameters import Parameters, Variant
 from app.core.variants import fitted_points
+from app.language.formatting import mm, um
 from app.language.i18n import _
-from app.language.numbers import mm, um
 
 WIDTH, HEIGHT = 320.0, 252.0
 RADIUS, REACH = 58.0, 20.0  # of the drawn part, and how far the largest residual stands off it

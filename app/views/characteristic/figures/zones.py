@@ -19,8 +19,8 @@ from app.charts import Axis, Chart, Dots, Faded, Note, Panel, Pen, Room, Series,
 from app.charts import Mark as Drawn
 from app.core.decision.limits import HasLimits, Limits
 from app.core.natural import half_of
+from app.language.formatting import as_read, read_um, um
 from app.language.i18n import _
-from app.language.numbers import as_read, read_um, um
 from app.language.times import plant_zone
 from app.loop.timeline.figures import Event, event_lane
 from app.views.characteristic.figures.blocks import Block, envelope, summed_up

@@ -1,5 +1,6 @@
-"""Lengths and times as people read them. The minus sign is a minus sign (U+2212); a sign of a deviation is always shown.
+"""Numbers, lengths and times written as people read them; numbers that people type are read in `app.core.number_text`.
 
+The minus sign is a minus sign (U+2212); a sign of a deviation is always shown.
 Lengths come in mm. Deviations, limits and corrections are read in µm, sizes in the drawing's mm.
 """
 
