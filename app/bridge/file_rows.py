@@ -10,7 +10,7 @@ from app.bridge.fields import EVERY, FIELDS
 from app.bridge.json_text import read_json
 from app.core.number_text import number_or_none
 from app.files.formats import delimited
-from app.files.formats.file_times import times_unnamed
+from app.files.formats.file_times import only_days, times_unnamed
 from app.files.formats.headings import TOP, Heading, as_wide, heading, is_labelled, is_reading, others
 from app.files.formats.number_with_unit import number_and_unit
 from app.files.formats.repeats import Remark, Repeats
@@ -119,21 +119,38 @@ class UnnamedTimes(NamedTuple):
 
 
 def unnamed_times(columns: Mapping[str, str], table: Sequence[tuple[int, Found]], pattern: str | None) -> UnnamedTimes:
-    """The only column that holds times, where `columns` names none that is there; a fault where several may be it."""
+    """The only column that holds times, where none is configured: none is there under its name, or that one holds days alone.
+
+    A fault where several may be it; a remark on numbers that may be times.
+    """
     rows = [row for _line, row in table if isinstance(row, Mapping)]
-    if any(has(row, columns.get("measured_at", "")) for row in rows):
+    named = columns.get("measured_at", "")
+    days = [str(cell_of(row, named) or "") for row in rows] if any(has(row, named) for row in rows) else []
+    if days and not only_days(days, pattern):
         return UnnamedTimes({}, [])
     names = dict.fromkeys(name for row in rows for name in row if name)
     used = {part for column in columns.values() for part in parts_of(column, names)}
     cells = {name: [str(row.get(name) or "") for row in rows] for name in names if name not in used}
-    sure, doubtful = times_unnamed(cells, pattern)
+    sure, doubtful, counted = times_unnamed(cells, pattern, days)
     if doubtful:
         reason = "hold dates, and columns.measured_at names none of them: name the one that is meant, or none, which means now"
-        fault = Fault(None, ", ".join(doubtful), f'{reason}: columns.measured_at = "{doubtful[0]}", or "".')
+        if days:
+            reason = f"hold times, and {named} holds days alone: name the one that is meant, or {named}, which means midnight"
+        fault = Fault(
+            None, ", ".join(doubtful), f'{reason}: columns.measured_at = "{doubtful[0]}", or "{named if days else ""}".'
+        )
         return UnnamedTimes({}, [(0, fault)])
-    words = 'holds dates and times and is taken for the time of measuring; if it is not, set columns.measured_at = ""'
-    said: Found = Remark(table[0][0] if table else 0, sure, "", words)
-    return UnnamedTimes({"measured_at": sure}, [(0, said)]) if sure else UnnamedTimes({}, [])
+    line = table[0][0] if table else 0
+    if counted:
+        name, form = next(iter(counted.items()))
+        said = f'columns.measured_at = "{name}"' + (f' and times = "{form}"' if form else "")
+        words = f'may be times, and columns.measured_at names none, which means now: set {said}, or columns.measured_at = ""'
+        return UnnamedTimes({}, [(line, Remark(line, name, "", words))])
+    other = f'columns.measured_at = "{named if days else ""}"'
+    words = f"holds dates and times and is taken for the time of measuring; if it is not, set {other}"
+    return (
+        UnnamedTimes({"measured_at": sure}, [(line, Remark(line, sure, "", words))]) if sure else UnnamedTimes({}, [])
+    )
 
 
 def unit_in_doubt(word: str) -> str:

@@ -7,6 +7,8 @@ others, or one that programs write where they have none, is no time.
 import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from datetime import date, datetime, time, timedelta
+from itertools import pairwise
+from types import MappingProxyType
 from typing import NamedTuple
 from zoneinfo import ZoneInfo
 
@@ -26,6 +28,11 @@ YEARS = 1900, 2200  # between them is a date that may be one; a form of times wi
 _LIKE_A_DATE = re.compile(r"\d[-./]\s?\d{1,2}[-./]|[^\W\d_]{3}|\dT\d")
 """In every text that may be a date. Of a wide sheet each cell is looked at."""
 _DATE_AND_TIME = re.compile(r"\d{1,4}([-./])\s?\d{1,2}\1\s?\d{1,4}\.?[\sT,]+\d{1,2}:\d{2}")
+_NUMBER = re.compile(r"\d{5,14}(?:[.,]\d+)?", re.ASCII)
+_COUNTED_YEARS = 2000, 2040  # between them a count is a time
+_SECONDS = 946_684_800, 2_208_988_800
+_DAYS = 36_526, 51_136
+_FEWEST_STEPS = 2
 _ZEROS = re.compile(r"0{1,4}([./-])0{1,2}\1 ?0{1,4}\.?(?:[/ .,T]+0{1,2}(?::0{1,2}){1,2}(?:[.,]0+)?)?[/Zz]?")
 
 
@@ -121,39 +128,127 @@ def times_of(texts: Iterable[str], pattern: str | None = None, read: Read | None
 
 
 class Unnamed(NamedTuple):
-    """Columns that hold times, and whose names do not say so. sure: the one that is taken. doubtful: those of which a person says it."""
+    """Columns that hold times, and whose names do not say so. sure: the one that is taken. doubtful: those of which a person says it.
+
+    counted: columns of numbers that may be times, each with the form that reads them; empty for 20251118060500, which needs none.
+    """
 
     sure: str = ""
     doubtful: tuple[str, ...] = ()
+    counted: Mapping[str, str] = MappingProxyType({})
 
 
-def times_unnamed(columns: Mapping[str, Sequence[str]], pattern: str | None = None) -> Unnamed:
+def times_unnamed(
+    columns: Mapping[str, Sequence[str]], pattern: str | None = None, days: Sequence[str] = ()
+) -> Unnamed:
     """The column among these that holds the times, by their names: the only one with dates and times, in every row.
+
+    days: the cells of the column whose name is that of times, if there is one. Where it holds nothing but days, another one may hold
+    the times as well: the only one with a time on the same day in every row. Other times of day, and no dates, are not looked for.
 
     Where there are more, or rows of it have none, or dates only, a person has to say. A column of one program's default is none.
 
-    >>> times_unnamed({"Stamp": ["18.11.2025 06:05", "18.11.2025 06:06"], "By": ["A", "B"]})
-    Unnamed(sure='Stamp', doubtful=())
-    >>> times_unnamed({"Stamp": ["18.11.2025 06:05", ""], "Day": ["18.11.2025", "18.11.2025"]})
-    Unnamed(sure='', doubtful=('Stamp',))
+    >>> times_unnamed({"Stamp": ["18.11.2025 06:05", "18.11.2025 06:06"], "By": ["A", "B"]}).sure
+    'Stamp'
+    >>> times_unnamed({"Stamp": ["18.11.2025 06:05", ""], "Day": ["18.11.2025", "18.11.2025"]}).doubtful
+    ('Stamp',)
     >>> times_unnamed({"Stamp": ["20251118T060500"], "Size": ["40.001"]}).sure
     'Stamp'
     >>> times_unnamed({"Day": ["18.11.2025", "18.11.2025"], "No": ["4711-01-02", "4711-13-02"]}).doubtful
     ('Day',)
+    >>> stamps = {"Stamp": ["18.11.2025 06:05", "19.11.2025 06:06"], "Cycle": ["00:01:35", "00:01:36"]}
+    >>> times_unnamed(stamps, days=["18.11.2025", "19.11.2025"]).sure, times_unnamed(stamps, days=["18.11.2025", "20.11.2025"]).doubtful
+    ('Stamp', ('Stamp',))
+    >>> times_unnamed({"Tick": ["1763442300", "1763442393", "1763442481"], "No": ["1700000001", "1700000002", "1700000003"]}).counted
+    {'Tick': 'seconds since 1970-01-01'}
     """
     moments: dict[str, int] = {}
-    days: list[str] = []
+    dates: list[str] = []
     for name, cells in columns.items():
         kinds = [_has_date(cell, pattern) for cell in cells]
         if not any(kinds) or (times_of(cells, pattern).nothing and "unread" not in kinds):
             continue
         if 2 * (times := len([kind for kind in kinds if kind in {"time", "unread"}])) >= len(kinds):
             moments[name] = times - len(kinds)
-        elif 2 * kinds.count("day") >= len(kinds):
-            days.append(name)
-    if list(moments.values()) == [0]:
+        elif 2 * kinds.count("day") >= len(kinds) and not days:
+            dates.append(name)
+    if list(moments.values()) == [0] and (
+        not days or _same_days(days, next(iter(columns[name] for name in moments)), pattern)
+    ):
         return Unnamed(next(iter(moments)))
-    return Unnamed(doubtful=tuple(moments or days))
+    if moments or dates:
+        return Unnamed(doubtful=tuple(moments or dates))
+    forms = (
+        {}
+        if pattern or days
+        else {name: form for name, cells in columns.items() if (form := _count(cells)) is not None}
+    )
+    return Unnamed(counted=forms)
+
+
+def only_days(cells: Iterable[str], pattern: str | None = None) -> bool:
+    """Tell of cells that hold nothing but days, be it with the midnight that programs write behind one.
+
+    >>> only_days(["18.11.2025", "", "19.11.2025 00:00:00"]), only_days(["18.11.2025 00:00", "18.11.2025 06:05"]), only_days([""])
+    (True, False, False)
+    """
+    written = [cell for cell in cells if cell.strip()]
+    return bool(written) and all(_day_of(cell, pattern, midnight=True) is not None for cell in written)
+
+
+def _same_days(days: Sequence[str], moments: Sequence[str], pattern: str | None) -> bool:
+    """Tell if these moments lie on the days beside them."""
+    orders = times_of(days, pattern).order, times_of(moments, pattern).order
+    pairs = zip(days, moments, strict=True)
+    return all(
+        not day.strip() or _day_of(day, pattern, orders[0]) == _day_of(at, pattern, orders[1]) is not None
+        for day, at in pairs
+    )
+
+
+def _day_of(cell: str, pattern: str | None, order: DayOrder | None = None, *, midnight: bool = False) -> date | None:
+    """The day of a moment; None of what is none. midnight: only where nothing else is written."""
+    if not _has_date(cell, pattern):
+        return None
+    try:
+        at = naive(
+            plain(cell), pattern, order or ("month_first" if slashed(cell) is Slashed.MONTH_FIRST else "day_first")
+        )
+    except Unreadable:
+        return None
+    return None if midnight and at.time() != time() else at.date()
+
+
+def _count(cells: Sequence[str]) -> str | None:
+    """The form by which numbers may be times: they go one way, from 2000 to 2040, and not by one as numbers of parts do.
+
+    Days of spreadsheets have a fraction, the time of day, and there are more of them: a size in micrometres is as large.
+    """
+    if not cells or not all(_NUMBER.fullmatch(plain(cell)) for cell in cells):
+        return None
+    texts = [plain(cell).replace(",", ".") for cell in cells]
+    numbers = [float(text) for text in texts]
+    steps = [after - before for before, after in pairwise(numbers) if after != before]
+    if len(steps) < _FEWEST_STEPS or not (min(steps) > 0 or max(steps) < 0):
+        return None
+    least, most = min(numbers), max(numbers)
+    if _DAYS[0] <= least and most < _DAYS[1]:
+        broken = sum(not number.is_integer() for number in numbers)
+        return "days since 1899-12-30" if 2 * broken > len(numbers) and len(steps) > 2 * _FEWEST_STEPS else None
+    if 2 * sum(abs(step) == 1 for step in steps) >= len(steps):
+        return None
+    for form, factor in (("seconds since 1970-01-01", 1), ("milliseconds since 1970-01-01", 1000)):
+        if _SECONDS[0] * factor <= least and most < _SECONDS[1] * factor:
+            return form
+    return "" if all(_compact(text) for text in texts) else None
+
+
+def _compact(text: str) -> bool:
+    """Tell of digits such as 20251118060500."""
+    try:
+        return _COUNTED_YEARS[0] <= naive(text).year < _COUNTED_YEARS[1]
+    except Unreadable:
+        return False
 
 
 def _has_date(cell: str, pattern: str | None) -> str:

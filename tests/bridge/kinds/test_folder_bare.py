@@ -89,3 +89,24 @@ def test_times_that_may_be_several_are_asked(tmp_path: Path) -> None:
     content = read(tmp_path, text, columns={"measured": "actual"}, names=ONE)
     assert "begin, end: hold dates, and columns.measured_at names none" in str(content.faults[0])
     assert [bool(each.fault) for each in content.received("cmm-1", "a.csv")] == [True]
+
+
+def test_a_full_time_beside_days_is_taken_and_said(tmp_path: Path) -> None:
+    text = "measured;measured_at;stamp;cycle\n40,01;23.11.2026;23.11.2026 06:05:00;00:01:35\n40,02;23.11.2026;23.11.2026 06:06:00;00:01:36\n"
+    content = read(tmp_path, text, columns={}, names=ONE)
+    assert bodies(content) == [(40.01, "06:05"), (40.02, "06:06")]
+    assert "stamp: holds dates and times" in " ".join(content.remarks)
+    content = read(tmp_path, text.replace("23.11.2026 06:06", "24.11.2026 06:06"), columns={}, names=ONE)
+    assert "stamp: hold times, and measured_at holds days alone" in str(content.faults[0])
+    said = {"measured": "measured", "measured_at": "measured_at"}
+    assert bodies(read(tmp_path, text, columns=said, names=ONE)) == [(40.01, "00:00"), (40.02, "00:00")]
+
+
+def test_numbers_that_may_be_times_are_said(tmp_path: Path) -> None:
+    """They stop no file: what comes in as it is measured has the time of now without them."""
+    text = "actual;tick\n40,01;1763442300\n40,02;1763442360\n40,03;1763442420\n"
+    content = read(tmp_path, text, columns={"measured": "actual"}, names=ONE)
+    assert [time for _size, time in bodies(content)] == ["", "", ""]
+    assert "tick: may be times" in " ".join(content.remarks)
+    assert 'columns.measured_at = "tick" and times = "seconds since 1970-01-01"' in " ".join(content.remarks)
+    assert read(tmp_path, text, columns={"measured": "actual", "measured_at": ""}, names=ONE).remarks == []

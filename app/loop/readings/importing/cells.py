@@ -445,6 +445,8 @@ def _converted(values: dict[str, Any], layout: Layout, number: int) -> Iterator[
     if isinstance(values.get("received_at"), str):
         values["received_at"] = _or_none(values["received_at"], layout.zone)
     for name in ("measured_at", "machined_at"):
+        if isinstance(values.get(name), int | float) and not isinstance(values[name], bool):
+            values[name] = str(values[name])  # a count, as in a table
         if isinstance(values.get(name), str):
             try:
                 at = layout.times.moment(values[name], layout.zone, layout.time_format)

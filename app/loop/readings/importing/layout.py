@@ -12,12 +12,13 @@ from zoneinfo import ZoneInfo
 from app.files.formats import cell_values, delimited, parts_across, spreadsheet
 from app.files.formats.cell_values import slashed
 from app.files.formats.delimited import Row, Unusable
-from app.files.formats.file_times import FileTimes, times_of, times_unnamed
+from app.files.formats.file_times import FileTimes, only_days, times_of, times_unnamed
 from app.files.formats.headings import TOP, as_wide, heading, is_reading, is_summary, others
 from app.files.formats.number_with_unit import number_and_unit
 from app.files.formats.units import LENGTHS, UnknownUnit, length_unit, unit_above
 from app.language.i18n import _
 from app.loop.readings.importing.columns import DRAWN, by_places, columns_of, fits, guesses_of, nominal_of
+from app.loop.readings.importing.named_times import counted_in_doubt, on_times, times_in_doubt
 from app.loop.readings.importing.refusals import (
     LONGEST_NAME,
     heading_or_reading,
@@ -81,6 +82,7 @@ class Layout:
     doubt: str = ""  # a unit that the lines above the table name, and do not say of what
     questions: tuple[tuple[str, str], ...] = ()  # what only a person can answer: the choice, and the sentence
     takes_times: bool = False  # of a column whose name does not say that it holds them
+    days: str = ""  # the column whose name says so, and that holds days alone
     thousands: Mapping[int, str] = field(default_factory=dict)  # a number whose sign may part thousands, by its column
     nominal: tuple[int, ...] = ()  # of the nominal size, which is one for all rows of a characteristic
     zone: ZoneInfo | None = None
@@ -148,13 +150,7 @@ class Layout:
     @property
     def on_times(self) -> str:
         """A sentence on times that are there under another name, or nowhere. Empty where a name or a person says them."""
-        if "measured_at" not in self.columns:
-            return _("There is no column of times: every reading gets the time of this import.")
-        words = _(
-            "No column has a known name for the time of measuring. {column} is taken for it: it alone has a date and a time in every line. "
-            "If it is something else, leave it out (--map measured_at=)."
-        )
-        return words.format(column=self.named("measured_at")) if self.takes_times else ""
+        return on_times(self.named("measured_at"), self.days, taken=self.takes_times)
 
     def of_one(self, key: str, name: str) -> "Layout":
         """The layout for one characteristic: of a table with rows of several, its own rows. Raises `Invalid`."""
@@ -310,7 +306,8 @@ def _csv_layout(path: Path, wishes: Wishes, zone: ZoneInfo | None, kind: str = "
     cells = [row.cells for row in below if row.line <= last and tuple(row.cells) != header]
     made = _with_unnamed(_timed(made, _times(made, below, rows)), wishes, cells)
     if made.takes_times:
-        made = _timed(made, _times(made, below, rows))
+        again = delimited.rows(path, encoding, delimiter)
+        made = _timed(made, _times(made, below, (row for row in again if row.line >= first_line)))
     return replace(made, drawn=_drawn(made, named))
 
 
@@ -354,22 +351,28 @@ def _timed(layout: Layout, times: FileTimes) -> Layout:
 
 
 def _with_unnamed(layout: Layout, wishes: Wishes, rows: Sequence[Sequence[Any]]) -> Layout:
-    """The layout with the column that alone holds times, or with the question which one does, where neither names nor a person say it."""
-    if "measured_at" in layout.columns or "measured_at" in wishes.mapping:
+    """The layout with the column that alone holds times, or with the question which one does, where no person says it.
+
+    That is where no column has a known name for them, or the one that has holds days alone.
+    """
+    if "measured_at" in wishes.mapping:
         return layout
+    named = layout.columns.get("measured_at", ())
+    days = [" ".join(written(row[at]) for at in named if at < len(row)) for row in rows]
+    if named and not only_days(days, wishes.time_format):
+        return layout
+    layout = replace(layout, days=layout.named("measured_at"))
     free = [place for place in layout.ignored_places if place not in layout.nominal]
     columns = {str(at): [written(row[at]) if at < len(row) else "" for row in rows] for at in free}
-    sure, doubtful = times_unnamed(columns, wishes.time_format)
+    sure, doubtful, counted = times_unnamed(columns, wishes.time_format, days if named else ())
     if sure:
         return replace(layout, columns={**layout.columns, "measured_at": (int(sure),)}, takes_times=True)
-    if not doubtful:
-        return layout
-    words = _(
-        "Dates stand under {columns}, and no column has a known name for the time of measuring. Say which it is (measured_at=COLUMN), or "
-        "that none is (measured_at=); then every reading gets the time of the import."
-    )
-    names = ", ".join(layout.header[int(at)] or str(int(at) + 1) for at in doubtful)
-    return replace(layout, questions=(*layout.questions, ("measured_at", words.format(columns=names))))
+    names = ", ".join(layout.header[int(at)] or str(int(at) + 1) for at in (*doubtful, *counted))
+    if counted:
+        question = counted_in_doubt(names, columns[next(iter(counted))][0], next(iter(counted.values())))
+    elif doubtful:
+        question = times_in_doubt(names, layout.days)
+    return replace(layout, questions=(*layout.questions, ("measured_at", question))) if names else layout
 
 
 def _times(layout: Layout, begin: Sequence[Row], rest: Iterator[Row]) -> FileTimes:
@@ -468,21 +471,24 @@ def _json_layout(path: Path, wishes: Wishes, zone: ZoneInfo | None, *, is_list: 
         rows = ((at, [value.get(name) for name in header]) for at, value in _objects(path, is_list=is_list))
         layout = replace(layout, drawn=_drawn(layout, rows))
     if "measured_at" in columns:
-        times, dated = _times_of(values, layout)
-        if not dated:
-            times, dated = _times_of((value for _at, value in _objects(path, is_list=is_list)), layout)
+        times = _times_of(values, layout)
+        if not times.dated:
+            times = _times_of((value for _at, value in _objects(path, is_list=is_list)), layout)
         layout = _timed(layout, times)
-    texts = [[text if isinstance(text := value.get(name), str) else "" for name in header] for value in values]
+    texts = [[_text(value.get(name)) for name in header] for value in values]
     layout = _with_unnamed(layout, wishes, texts)
-    return _timed(layout, _times_of(values, layout)[0]) if layout.takes_times else layout
+    return _timed(layout, _times_of(values, layout)) if layout.takes_times else layout
 
 
-def _times_of(values: Iterable[Mapping[str, Any]], layout: Layout) -> tuple[FileTimes, bool]:
-    """Common properties of the times of these objects, and if there are any, be it as numbers."""
+def _times_of(values: Iterable[Mapping[str, Any]], layout: Layout) -> FileTimes:
+    """Common properties of the times of these objects."""
     name = layout.named("measured_at")
-    texts = [value.get(name) for value in values]
-    times = times_of((text for text in texts if isinstance(text, str)), layout.time_format)
-    return times, times.dated or any(isinstance(text, int | float) for text in texts)
+    return times_of((_text(value.get(name)) for value in values), layout.time_format)
+
+
+def _text(value: Any) -> str:
+    """A text or a number of JSON as the text that a table would have; empty of anything else."""
+    return str(value) if isinstance(value, str | int | float) and not isinstance(value, bool) else ""
 
 
 def _objects(path: Path, *, is_list: bool) -> Iterator[tuple[int, dict[str, Any]]]:
