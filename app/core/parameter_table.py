@@ -139,7 +139,7 @@ FIELDS: tuple[Field, ...] = (
     Field("upper_deviation", "R40", FieldKind.LENGTH),
     Field("lower_deviation", "R41", FieldKind.LENGTH),
     Field("target", "R32", FieldKind.LENGTH),
-    Field("tolerance_width", "R35", FieldKind.LENGTH, lowest=0),
+    Field("tolerance_width", "R35", FieldKind.LENGTH, lowest=0.000001),
     Field("natural_limit", None, FieldKind.CHOICE, choices=_choices(NaturalLimit)),
     Field("zero_range", "R33", FieldKind.LENGTH, required=True, lowest=0, source_range=(0, 0.1)),
     Field("averaging_limit", "R34", FieldKind.LENGTH, lowest=0, source_range=(0, 0.1)),

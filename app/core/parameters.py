@@ -4,7 +4,7 @@
 fields is in `parameter_table`. Lengths are mm.
 """
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass, fields
 from enum import StrEnum
 from functools import cached_property
@@ -248,17 +248,7 @@ def read(given: Mapping[str, Any]) -> tuple[Parameters, list[Problem]]:
     values["accept_n"], values["accept_m"] = _accept(accept, problems)
     values.setdefault("natural_limit", assumed(values).value)
     _target(values, problems)
-    if problems:
-        raise ParameterError(problems)
-    values.setdefault("averaging_limit", default_averaging_limit(values["tolerance_width"], values["natural_limit"]))
-    if values["tool_memory"] != 0 and values["mode"] != Mode.MEASURE_ONLY and "factor" not in values:
-        problems.append(Problem("factor", "sign_missing", {}))
-    elif values.setdefault("factor", -1.0) == 0:
-        problems.append(Problem("factor", "factor_zero", {}))
-    problems.extend(_order(values))
-    problems.extend(_sections(values))
-    problems.extend(_tool_measured(values))
-    problems.extend(_natural(values))
+    problems.extend(_together(values, {problem.field for problem in problems}))
     if problems:
         raise ParameterError(problems)
     for name, enum in ENUMS.items():
@@ -364,13 +354,43 @@ def _sections(values: Mapping[str, Any]) -> Iterator[Problem]:
         yield Problem("points", "sections", {"points": points, "sections": sections})
 
 
+def _together(values: dict[str, Any], wrong: Collection[str]) -> list[Problem]:
+    """Say what does not go together, and fill in the averaging limit and the factor that follow from the rest.
+
+    wrong: the fields that were refused already: what depends on them is not judged, the rest is, so that all is said at once.
+    """
+    known = {name: value for name, value in values.items() if name not in wrong}
+    if "averaging_limit" not in wrong and {"tolerance_width", "natural_limit"} <= known.keys():
+        usual = default_averaging_limit(known["tolerance_width"], known["natural_limit"])
+        known["averaging_limit"] = values.setdefault("averaging_limit", usual)
+    problems = [
+        *_sign(known, values.keys()),
+        *_order(known),
+        *(_sections(known) if {"accept", "points", "variant"}.isdisjoint(wrong) else ()),
+        *(_tool_measured(known) if {"feature", "tool_memory", "mode"}.isdisjoint(wrong) else ()),
+        *(_natural(known) if {"natural_limit", "tool_memory", "mode"}.isdisjoint(wrong) else ()),
+    ]
+    values.setdefault("factor", -1.0)
+    return problems
+
+
+def _sign(known: Mapping[str, Any], given: Collection[str]) -> Iterator[Problem]:
+    """The factor is never guessed where something is corrected, and never 0. A tool that was mistyped is a tool."""
+    if "factor" in given:
+        if known.get("factor") == 0:
+            yield Problem("factor", "factor_zero", {})
+    elif known.get("tool_memory", 1) != 0 and known.get("mode", Mode.MEASURE_ONLY) != Mode.MEASURE_ONLY:
+        yield Problem("factor", "sign_missing", {})
+
+
 def _target(values: dict[str, Any], problems: list[Problem]) -> None:
     """Bring nominal with deviations (L75) and target with width into one; refuse both that disagree."""
+    wrong = {problem.field for problem in problems}
     drawing = [values.get(name) for name in ("nominal", "upper_deviation", "lower_deviation")]
     if any(value is not None for value in drawing):
         missing = [name for name in ("nominal", "upper_deviation", "lower_deviation") if values.get(name) is None]
         problems.extend(Problem(name, "required", {}) for name in missing)
-        if missing or problems:
+        if missing or wrong & {"nominal", "upper_deviation", "lower_deviation", "natural_limit"}:
             return
         target, width = mean_nominal(
             values["nominal"], values["upper_deviation"], values["lower_deviation"], values["natural_limit"]
@@ -394,16 +414,22 @@ def _target(values: dict[str, Any], problems: list[Problem]) -> None:
 
 
 def _order(values: Mapping[str, Any]) -> Iterator[Problem]:
-    """R33 < R34 <= R35/2 <= R37 <= R36; every broken pair is named at its outer member. From a natural limit R35 counts whole."""
-    half = half_width(values["tolerance_width"], values["natural_limit"])
+    """R33 < R34 <= R35/2 <= R37 <= R36; every broken pair of which both are known is named at its outer member.
+
+    From a natural limit R35 counts whole.
+    """
+    width, natural = values.get("tolerance_width"), values.get("natural_limit")
+    half = None if width is None or natural is None else half_width(width, natural)
     chain = (
-        ("zero_range", "R33", values["zero_range"]),
-        ("averaging_limit", "R34", values["averaging_limit"]),
-        ("tolerance_width", "R35/2" if values["natural_limit"] == NaturalLimit.NONE else "R35", half),
-        ("wear_limit", "R37", values["wear_limit"]),
-        ("confidence_limit", "R36", values["confidence_limit"]),
+        ("zero_range", "R33", values.get("zero_range")),
+        ("averaging_limit", "R34", values.get("averaging_limit")),
+        ("tolerance_width", "R35/2" if natural == NaturalLimit.NONE else "R35", half),
+        ("wear_limit", "R37", values.get("wear_limit")),
+        ("confidence_limit", "R36", values.get("confidence_limit")),
     )
     for (_, inner, smaller), (name, outer, larger) in pairwise(chain):
+        if smaller is None or larger is None:
+            continue
         strictly = inner == "R33"
         broken = nanometres(smaller) >= nanometres(larger) if strictly else nanometres(smaller) > nanometres(larger)
         if broken:

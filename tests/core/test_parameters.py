@@ -248,6 +248,24 @@ def test_everything_that_is_wrong_is_said_at_once() -> None:
     }
 
 
+def test_what_does_not_go_together_is_said_beside_what_is_wrong_alone() -> None:
+    """Six bad values are refused in one round."""
+    bad = {"upper_deviation": -0.016, "tool_memory": 0.5, "zero_range": -1, "wear_limit": 2.0, "confidence_limit": 1.0}
+    known = {name: value for name, value in SHAFT.items() if name != "factor"}
+    assert problems(known | bad) == {
+        "upper_deviation": "tolerance_sign",
+        "tool_memory": "not_whole",
+        "zero_range": "range",
+        "confidence_limit": "order",
+        "factor": "sign_missing",
+    }
+    assert problems(SHAFT | {"averaging_limit": 0.009, "wear_limit": "0.3x", "factor": 0}) == {
+        "tolerance_width": "order",
+        "wear_limit": "not_a_number",
+        "factor": "factor_zero",
+    }, "limits that are known are compared"
+
+
 def test_a_parameter_may_not_come_under_two_names() -> None:
     assert problems(SHAFT | {"R33": 0.001}) == {"R33": "twice"}
 
@@ -270,6 +288,8 @@ def test_a_step_of_nothing_is_no_step() -> None:
 def test_a_tolerance_needs_a_width() -> None:
     assert problems(SHAFT | {"upper_deviation": -0.016}) == {"upper_deviation": "tolerance_sign"}
     assert problems(SHAFT | {"upper_deviation": -0.02}) == {"upper_deviation": "tolerance_sign"}
+    direct = dict.fromkeys(("nominal", "upper_deviation", "lower_deviation")) | {"target": 40.0, "tolerance_width": 0}
+    assert problems(SHAFT | direct) == {"tolerance_width": "range"}
 
 
 @given(

@@ -39,8 +39,6 @@ from app.web.paging import Order, address, part_of
 router = APIRouter(include_in_schema=False)
 ON_PAGE = 200
 SAME = 5e-7  # mm; a smaller difference of R33 is none
-ANY_SIZE = {"target": "1", "tolerance_width": "0.1"}
-FACTOR = "parameters.factor"
 LOOKED_BACK = 100  # readings from which a plausible jump is suggested
 
 
@@ -115,23 +113,17 @@ def _with_suggestions(session: Session, form: Mapping[str, str]) -> dict[str, st
 def _all_errors(error: InbandError, named: Mapping[str, str], form: Mapping[str, str]) -> dict[str, str]:
     """Errors of the names and of the parameters together, each once.
 
-    Limits that are to be suggested once the tolerance is known are no errors; without a tool, or a size, the rest is looked at
-    as with one.
+    Limits that are to be suggested once the tolerance is known are no errors; without a tool the rest is looked at as with one.
     """
     unsaid = {name for name in SuggestedLimits._fields if not form.get(name, "").strip()}
-    assumed = dict(form) | dict.fromkeys(unsaid, "1")
-    if not form.get("tool_memory", "").strip():
-        assumed["tool_memory"] = "1"
-    errors = [each for each in error.errors if each.field.removeprefix("parameters.") not in unsaid]
-    errors += actions.refusals(parameter_form.parameters_from(assumed))
+    assumed = dict(form) if form.get("tool_memory", "").strip() else dict(form) | {"tool_memory": "1"}
+    errors = [*error.errors, *actions.refusals(parameter_form.parameters_from(assumed))]
+    errors = [each for each in errors if each.field.removeprefix("parameters.") not in unsaid]
     try:
         parsed(CharacteristicIn, dict(named) | {"parameters": {}})
     except Invalid as of_names:
         made = () if named["key"] else ("key",)  # from the name
         errors += [each for each in of_names.errors if each.field not in made]
-    sized = assumed | dict.fromkeys((*parameter_form.DRAWING, *SuggestedLimits._fields), "") | ANY_SIZE
-    sized = parameter_form.with_suggestions(sized, 0.0, (), AVERAGE_LOCATIONS)
-    errors += [each for each in actions.refusals(parameter_form.parameters_from(sized)) if each.field == FACTOR]
     return by_field(Invalid(error.detail, errors=dict.fromkeys(errors)))
 
 

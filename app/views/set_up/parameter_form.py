@@ -237,7 +237,7 @@ def micrometres(name: str, text: str) -> str:
     value = _length(text)
     if value is None:
         return ""
-    sign = "" if name not in DRAWING else "\N{MINUS SIGN}" if value < 0 else "+"
+    sign = "\N{MINUS SIGN}" if value < 0 else "+" if name in DRAWING else ""
     return f"{sign}{short(abs(value) * 1000)}\N{NO-BREAK SPACE}µm"
 
 

@@ -97,7 +97,7 @@ customElements.define("zone-diagram", class extends HTMLElement {
     }
     for (const output of this.form.querySelectorAll("[data-um]")) {
       const value = typed(this.form.elements[output.dataset.um].value);
-      const sign = output.dataset.um.endsWith("deviation") ? (value < 0 ? MINUS : "+") : "";
+      const sign = value < 0 ? MINUS : output.dataset.um.endsWith("deviation") ? "+" : "";
       output.textContent = usable(value) ? `${sign}${plain(Math.abs(value) * 1000)}\u00a0µm` : "";
     }
   }

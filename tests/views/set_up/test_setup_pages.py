@@ -143,7 +143,7 @@ class TestCharacteristics:
         expected = FORM | {"averaging_limit": "0,009", "max_step": "ein", "wear_limit": "0.3x", "part": "0815"}
         assert {name: shown.get(name) for name in expected} == expected
         assert shown["name"] == SERBIAN
-        assert len(errors(page)) == 2, "what can be compared once these are numbers is told then"
+        assert len(errors(page)) == 3, "limits that are known are compared at once"
         page = self.new(engineer, shop, "refused", 422, averaging_limit="0,009").text
         (told,) = errors(page)
         assert told.startswith("R34 averaging limit 0.0090 mm must not be larger than R35/2 = 0.0080 mm; lower it")
@@ -153,6 +153,17 @@ class TestCharacteristics:
     def test_names_and_parameters_are_reported_at_once(self, engineer: Person, shop: Shop) -> None:
         page = self.new(engineer, shop, "No Key", 422, machine="", zero_range="0.1").text
         assert len(errors(page)) == 3
+
+    def test_all_that_is_wrong_is_marked_the_first_time(self, engineer: Person, shop: Shop) -> None:
+        """A tolerance of nothing hides no other error, and a limit that is to be suggested is none."""
+        wrong = {"upper_deviation": "-0,016", "tool_memory": "0,5", "zero_range": "-1", "averaging_limit": "abc"}
+        rest = {"wear_limit": "", "confidence_limit": "x", "factor": ""}
+        page = self.new(engineer, shop, unique("bad"), 422, **wrong, **rest).text
+        marked = re.findall(r'id="f-(\w+)"[^>]*aria-invalid="true"', page)
+        assert {*marked} >= {*wrong, "confidence_limit"}
+        assert len(errors(page)) == 6
+        assert "The factor is missing" in page
+        assert "\N{MINUS SIGN}1000\N{NO-BREAK SPACE}µm" in page, "the sign is shown"
 
     def test_what_is_left_empty_is_suggested_and_the_loop_acts(self, engineer: Person, shop: Shop) -> None:
         """Name, drawing, tool and sign are enough; after them the first size that is off leads to a correction."""
