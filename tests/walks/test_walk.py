@@ -19,7 +19,9 @@ from tests.loop.readings.record import must_hold
 from tests.shop import Shop
 from tests.walks.addresses import KNOWN
 from tests.walks.walker import OPENED, WITHOUT_BODY, Walker
-from tests.web.test_bad_input import BODIES, REACTION, Place, operations
+from tests.web.api_operations import operations
+from tests.web.good_bodies import BODIES, REACTION
+from tests.web.whole_plant import Place
 
 
 @pytest.fixture

@@ -1,6 +1,6 @@
 """Somebody who does whatever the product lets one do, by chance: acts of the API, readings, forms of pages, periodic jobs.
 
-The bodies are those of tests/web/test_bad_input.py, which are good ones; names and numbers in them are put out of the record of
+The bodies are those of tests/web/good_bodies.py, which are good ones; names and numbers in them are put out of the record of
 the moment, choices are made anew, and what need not be said is left out now and then. Refusals are answers too; faults are not.
 """
 
@@ -20,7 +20,8 @@ from tests.pages.house import PAGES
 from tests.shop import PARAMETERS, Person
 from tests.walks.addresses import Record
 from tests.walks.forms import forms
-from tests.web.test_bad_input import BODIES, Operation, body_schema, operations, resolved
+from tests.web.api_operations import Operation, body_schema, operations, resolved
+from tests.web.good_bodies import BODIES
 
 ONE_AT_A_TIME = threading.Lock()  # of all processes of a plant one runs the periodic jobs
 

@@ -8,7 +8,8 @@ import httpx
 import pytest
 
 from tests.shop import Person, Shop
-from tests.web.test_bad_input import BODIES, operations
+from tests.web.api_operations import operations
+from tests.web.good_bodies import BODIES
 
 
 def tag(shop: Shop, path: str) -> str:

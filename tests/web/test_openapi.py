@@ -1,8 +1,7 @@
-"""The OpenAPI document is complete and true, and its page can be used."""
+"""The OpenAPI document is complete and true."""
 
 import json
 import re
-import subprocess
 from collections.abc import Iterator
 from datetime import UTC, datetime, timedelta
 from typing import Any
@@ -12,16 +11,15 @@ import msgspec
 import pytest
 from fastapi import FastAPI
 from fastapi.routing import APIRoute, iter_route_contexts
-from playwright.sync_api import Page, expect
 from pydantic import BaseModel, TypeAdapter
 
 from app.loop.readings.answers import ReadingAnswer
 from app.loop.readings.api import BatchCounts
 from app.loop.readings.schemas import ReadingIn
-from app.web.api_docs import _kind, curl, prose
 from app.web.openapi import EXAMPLES, example_of, operations, resolve
 from tests.conftest import RunServer, Server
 from tests.in_process import application
+from tests.web.api_operations import document
 
 pytestmark = pytest.mark.own_server  # the examples name machines and characteristics
 
@@ -36,9 +34,8 @@ def app() -> FastAPI:
 
 
 @pytest.fixture(scope="module")
-def made(app: FastAPI) -> Json:
-    travelled: Json = json.loads(json.dumps(app.openapi()))
-    return travelled
+def made() -> Json:
+    return document()
 
 
 def api_routes(app: FastAPI) -> Iterator[APIRoute]:
@@ -266,8 +263,6 @@ class TestExamples:
 
 
 # --- the document against the server
-
-
 @pytest.fixture(scope="module")
 def plant(server: Server, made: Json) -> Json:
     """The server of this file, for tests that leave the things of the examples as they are."""
@@ -355,148 +350,6 @@ OF_MANY_READINGS = (
     "/baselines/preview",
     "/gauge-studies/from-readings",
 )
-
-
-# What a page's form does, by the operations of the API that do the same; None: there is none, or it is for everybody.
-FORMS: dict[str, tuple[str, ...] | None] = {
-    "/account/password": None,
-    "/account/pin": None,
-    "/simulated": ("add_machine",),
-    "/simulated/remove": ("add_machine",),
-    "/alarms/{number}/acknowledge": ("acknowledge_alarm",),
-    "/alarms/{number}/affected": ("set_parts_aside",),
-    "/alarms/{number}/photos": ("add_photo_of_alarm",),
-    "/alarms/{number}/photos/{photo}/remove": ("remove_photo_of_alarm",),
-    "/characteristics/{characteristic}/trial/start": ("start_correcting",),
-    "/characteristics/{characteristic}/control-plan": ("set_control_plan",),
-    "/characteristics/{characteristic}/temperature": ("set_expansion",),
-    "/quarantines/{number}/parts/{part}/{what}": ("measure_part_again", "release_part", "scrap_part"),
-    "/alignments/new": ("align",),
-    "/alignments/pallets/new": ("compose_pallet",),
-    "/alignments/{number}/acknowledge": ("acknowledge_alignment",),
-    "/alignments/{number}/recompute": ("recompute_alignment",),
-    "/calibration/{machine}/{memory}/{location}": ("calibrate_gauge", "calibrate_ring", "add_pair", "plan_calibration"),
-    "/calibration/{machine}/{memory}/{location}/{what}/{number}": (
-        "accept_calibration",
-        "accept_suggestion",
-        "exclude_pair",
-    ),
-    "/characteristics/{characteristic}/control/baselines/{version}/{what}": (
-        "put_baseline_in_force",
-        "retire_baseline",
-    ),
-    "/characteristics/{characteristic}/control/freeze": ("freeze_baseline",),
-    "/characteristics/{characteristic}/readings/{sequence}/by-hand": ("add_hand_measurement",),
-    "/characteristics/{characteristic}/readings/{sequence}/exclude": ("exclude_reading",),
-    "/characteristics/{characteristic}/rules": ("put_rules",),
-    "/characteristics/{characteristic}/what-if": ("propose_change",),
-    "/corrections/{machine}/tools/{tool}": ("approve_corrections",),
-    "/forms/new": ("measure_form",),
-    "/forms/{form}/recompute": ("recompute_form",),
-    "/gauges/new": ("add_gauge_study", "take_gauge_study"),
-    "/gauges/{number}/correct": ("correct_gauge_study",),
-    "/import": None,
-    "/import/{token}": None,
-    "/invitation/{token}": None,
-    "/kinematics/machines/{machine}": ("plan_kinematics",),
-    "/kinematics/machines/{machine}/backups/{version}": ("restore_kinematics",),
-    "/kinematics/new": ("take_kinematics_run",),
-    "/kinematics/runs/{run}/recompute": ("recompute_kinematics_run",),
-    "/kinematics/runs/{run}/{what}": ("confirm_kinematics_run", "enter_kinematics_run", "undo_kinematics_run"),
-    "/machines/{machine}/averages/{location}/edit": ("set_empirical_value",),
-    "/machines/{machine}/connection/remove": ("remove_connection",),
-    "/machines/{machine}/touch-tests": ("ask_for_touch_test",),
-    "/machines/{machine}/touch-tests/{number}/answer": ("answer_touch_test",),
-    "/machines/{machine}/touch-tests/{number}/stop": ("stop_touch_test",),
-    "/machines/{machine}/corrections/program": ("mark_fetched", "confirm_corrections"),
-    "/machines/{machine}/corrections/{number}": ("approve_correction", "release_correction", "reject_correction"),
-    "/machines/{machine}/tools/{number}": ("describe",),
-    "/machines/{machine}/tools/{number}/{what}": ("edit_tool", "change_tool", "switch_tool"),
-    "/account/notifications": None,
-    "/account/notifications/browser": None,
-    "/setup/notifications/days-off": ("set_days_off",),
-    "/setup/notifications/groups/new": ("add_receiver_group",),
-    "/setup/notifications/groups/{group}": ("change_receiver_group", "delete_receiver_group"),
-    "/setup/notifications/receivers": ("add_receiver",),
-    "/setup/notifications/receivers/{receiver}/delete": ("delete_receiver",),
-    "/setup/notifications/receivers/{receiver}/test": ("send_test",),
-    "/setup/notifications/routes/new": ("add_notification_route",),
-    "/setup/notifications/routes/{route}": ("change_notification_route", "delete_notification_route"),
-    "/setup/reactions/new": ("add_reaction_plan", "add_reaction_picture"),
-    "/setup/reactions/{plan}": ("change_reaction_plan", "withdraw_reaction_plan", "add_reaction_picture"),
-    "/setup/reactions/catalogue": ("add_catalogue_entry",),
-    "/setup/reactions/catalogue/{entry}": ("change_catalogue_entry",),
-    "/notes/new": ("write_note",),
-    "/maintenance/new": ("enter_maintenance",),
-    "/maintenance/{number}/end": ("end_maintenance",),
-    "/maintenance/{number}/extend": ("extend_maintenance",),
-    "/notes/{number}/withdraw": ("withdraw_note",),
-    "/proposals/{number}": ("approve_proposal", "reject_proposal", "withdraw_proposal"),
-    "/reports": ("ask_for_reports",),
-    "/reports/{number}/cancel": ("cancel_reports",),
-    "/reports/{number}/throw-away": ("throw_reports_away",),
-    "/setup/characteristics/new": ("add_characteristic",),
-    "/setup/characteristics/{characteristic}": ("change_characteristic",),
-    "/setup/characteristics/{characteristic}/forms": ("add_characteristic",),
-    "/setup/machines/new": ("add_machine",),
-    "/setup/machines/{machine}": ("change_machine",),
-    "/setup/machines/{machine}/keys": ("make_machine_key",),
-    "/setup/machines/{machine}/keys/{key}/revoke": ("revoke_machine_key",),
-    "/setup/parameters": ("change_characteristic",),
-    "/setup/people/invitations": ("invite_person",),
-    "/setup/people/invitations/{token_hash}/withdraw": ("invite_person",),
-    "/setup/people/keys": ("make_key",),
-    "/setup/people/keys/{key}/revoke": ("revoke_key",),
-    "/setup/people/{person}/password": ("change_person",),
-    "/setup/people/{person}/{what}": ("change_person",),
-    "/setup/programs": ("read_program",),
-    "/setup/screens": ("add_wall_screen",),
-    "/setup/screens/{screen}/revoke": ("revoke_wall_screen",),
-    "/setup/stations": None,
-    "/setup/stations/badges": None,
-    "/setup/stations/badges/{person}/remove": None,
-    "/setup/stations/{device}/revoke": None,
-    "/sign-in": None,
-    "/station": None,
-    "/station/{machine}/alarms/{number}": None,  # on a device it is asked who acts: tests/views/station
-    "/station/{machine}/alarms/{number}/photos": None,
-    "/station/{machine}/context": None,
-    "/station/{machine}/corrections/{number}": None,
-    "/station/{machine}/note": None,
-    "/station/{machine}/sizes": None,
-    "/station/{machine}/tools/{number}/change": None,
-    "/station/{machine}/tools/{number}/corrections": None,
-    "/sign-out": None,
-    "/signals/{number}": ("comment_signal",),
-    "/work-zeros/fixtures/{machine}/{fixture}": ("watch_fixture",),
-    "/work-zeros/new": ("find_work_zero",),
-    "/work-zeros/{number}/acknowledge": ("acknowledge_work_zero",),
-    "/work-zeros/{number}/recompute": ("recompute_work_zero",),
-}
-
-
-def test_a_page_asks_for_the_role_that_the_api_asks_for(app: FastAPI, made: Json) -> None:
-    """A form that does one of several things asks for the least of their roles, and its action for more where it must."""
-    roles = {operation["operationId"]: operation.get("x-role") for _m, _p, operation in operations(made)}
-    differing = {}
-    for context in iter_route_contexts(app.routes):
-        route = context.original_route
-        if not isinstance(route, APIRoute) or route.path.startswith("/api") or (route.methods or set()) <= {"GET"}:
-            continue
-        same = FORMS[route.path]
-        if same is None:
-            continue
-        dependencies = route.dependant.dependencies
-        inner = [
-            each for dependency in dependencies for each in dependency.dependencies
-        ]  # of the kit: who acts on what
-        calls = [dependency.call for dependency in (*dependencies, *inner)]
-        names = [getattr(call, "__name__", "") for call in calls]
-        asked = {name.removeprefix("require_") for name in names if name.startswith("require_")}
-        wanted = min((roles[name] for name in same), key=ROLES.index)
-        if asked != {wanted}:
-            differing[route.path] = (asked, wanted)
-    assert differing == {}
 
 
 class TestAgainstTheServer:
@@ -599,86 +452,3 @@ class TestAgainstTheServer:
         answer = server.client().get("/api/v1/openapi.json")
         assert answer.headers["content-type"] == "application/json"
         assert answer.json() == made
-
-
-class TestPage:
-    def test_every_operation_stands_on_it_with_a_command(self, server: Server, made: Json) -> None:
-        text = server.client().get("/api/docs").text
-        for each in ids(made):
-            assert f'id="{each}"' in text
-        assert text.count("curl -sS") == len(ids(made))
-        assert "correction_in_effect" in text
-        assert "R33. Zero range." in text
-
-    def test_searching_opening_and_printing(self, page: Page) -> None:
-        page.goto("/api/docs")
-        assert page.locator("details.operation[open]").count() == 0
-        page.keyboard.press("/")
-        page.keyboard.type("offset_after")
-        expect(page.locator("#mark_applied")).to_be_visible()
-        expect(page.locator("#list_people")).to_be_hidden()
-        page.get_by_role("searchbox").fill("no such words anywhere")
-        expect(page.get_by_role("status").first).to_have_text("Nothing has all of these words.")
-        page.get_by_role("searchbox").fill("")
-        page.get_by_role("navigation", name="Operations").get_by_role("link", name="Push reading").click()
-        expect(page.locator("#push_reading[open]")).to_be_visible()
-        page.evaluate("dispatchEvent(new Event('beforeprint'))")
-        assert page.locator("details.operation:not([open])").count() == 0
-        page.evaluate("dispatchEvent(new Event('afterprint'))")
-        assert page.locator("details.operation[open]").count() == 1
-
-    @pytest.mark.long
-    def test_it_is_linked_and_knows_who_is_signed_in(self, page: Page, server: Server) -> None:
-        password = server.person("Dora", "viewer")
-        page.goto("/sign-in")
-        page.get_by_label("Name").fill("Dora")
-        page.locator("input[type=password]").fill(password)
-        page.locator("main button[type=submit]").click()
-        page.wait_for_url(f"{server.url}/")
-        page.get_by_role("contentinfo").get_by_role("link", name="API").click()
-        expect(page.get_by_role("heading", level=1)).to_have_text("API")
-        expect(page.get_by_role("banner")).to_contain_text("Dora")
-
-    def test_wide_things_do_not_widen_it(self, page: Page) -> None:
-        page.set_viewport_size({"width": 800, "height": 1000})
-        page.goto("/api/docs#add_characteristic")
-        expect(page.locator("#add_characteristic[open]")).to_be_visible()
-        assert page.evaluate("document.documentElement.scrollWidth") <= 800
-
-
-class TestWords:
-    @pytest.mark.parametrize(
-        ("text", "html"),
-        [
-            ("a `b<c` d", "<p>a <code>b&lt;c</code> d</p>"),
-            ("<script>", "<p>&lt;script&gt;</p>"),
-            ("raises *offset differs*", "<p>raises <em>offset differs</em></p>"),
-            ("3 * 4", "<p>3 * 4</p>"),
-            ("First\nline\n\n- one\n- `two`", "<p>First line</p><ul><li>one</li><li><code>two</code></li></ul>"),
-        ],
-    )
-    def test_docstrings_become_html(self, text: str, html: str) -> None:
-        assert prose(text) == html
-
-    @pytest.mark.parametrize(
-        ("schema", "words"),
-        [
-            ({"type": "integer", "minimum": 1, "maximum": 32}, "whole number, 1 to 32"),
-            ({"type": "string", "maxLength": 64}, "text, at most 64 characters"),
-            ({"enum": ["a", "b", None]}, "a | b"),
-            ({"type": ["number", "null"], "minimum": 0}, "number, at least 0 or null"),
-            ({"anyOf": [{"type": "string", "format": "date-time"}, {"type": "null"}]}, "time or null"),
-            ({"type": "array", "items": {"type": "boolean"}}, "list of true or false"),
-            ({}, "any"),
-        ],
-    )
-    def test_schemas_become_words(self, schema: Json, words: str) -> None:
-        assert _kind({}, schema) == words
-
-    def test_the_command_survives_a_shell(self) -> None:
-        body = {"content": {"application/json": {"example": {"reason": "it's $HOME `date`"}}}}
-        line = curl("post", "/x/{key}", {"parameters": [], "requestBody": body, "responses": {}}, "http://host")
-        said = subprocess.run(
-            ["sh", "-c", f"curl() {{ printf '%s\\n' \"$@\"; }}\n{line}"], capture_output=True, text=True
-        )
-        assert '{"reason": "it\'s $HOME `date`"}' in said.stdout.splitlines()

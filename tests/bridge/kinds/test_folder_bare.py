@@ -6,7 +6,7 @@ from typing import Any
 import pytest
 
 from app.bridge.file_content import Content
-from tests.bridge.kinds.test_folder import read
+from tests.bridge.kinds.measured_folder import read
 
 ONE = {"*": "shaft-1"}
 HELD = "holds values, so the table has no heading"

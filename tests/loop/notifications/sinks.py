@@ -23,6 +23,9 @@ from cryptography.hazmat.primitives.asymmetric import ec
 
 from app.loop.notifications.means import signature
 
+NETWORKS: dict[str, Any] = {"webhook_networks": "127.0.0.0/8"}
+"""Settings with which webhooks may lead to these servers."""
+
 
 class Mails:
     """A mail server. It takes everything, but for addresses that begin with what it does: refused, mute, rude."""

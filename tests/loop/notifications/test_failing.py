@@ -16,15 +16,9 @@ from app.loop.notifications.schemas import RouteIn
 from app.loop.notifications.tables import NotificationRoute, Receiver
 from tests.conftest import NewDatabase, drop_database, free_port
 from tests.in_process import InProcess, in_process
-from tests.loop.notifications.sinks import Hooks, web_server
+from tests.loop.notifications.sinks import Hooks
 from tests.shop import Person, Shop, unique
 from tests.waits import until
-
-
-@pytest.fixture(scope="module")
-def hooks() -> Iterator[Hooks]:
-    with web_server() as made:
-        yield made
 
 
 @pytest.fixture(scope="module")
@@ -121,9 +115,6 @@ def test_one_that_fails_again_and_again_is_seen_and_reported_until_it_is_reached
     assert bad["name"] not in operator.open("/todo")
     assert bad["name"] not in operator.open("/todo/not-reached")
     assert len(about(hooks, path, bad)) == 1, "no flood"
-
-
-# --- one step of it at a time
 
 
 def added(session: Any, *names: str, **more: Any) -> list[int]:

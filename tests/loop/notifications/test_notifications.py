@@ -1,4 +1,4 @@
-"""Notifications end to end: real PostgreSQL, a mail server, a web server that hangs, redirects and answers 500."""
+"""Notifications in the whole application: mail, webhook, apprise, routes, shifts, and maintenance."""
 
 import re
 import socket
@@ -6,47 +6,27 @@ import sys
 from collections.abc import Iterator
 from datetime import UTC, datetime, timedelta
 from io import BytesIO
-from pathlib import Path
-from threading import BoundedSemaphore, Event
 from types import ModuleType
 from typing import Any
 
 import pytest
-from aiosmtpd.smtp import AuthResult
 from PIL import Image, ImageColor
 from sqlalchemy import select, text
 from sqlalchemy.orm import Session
 
 from app.access.tables import Person
-from app.db.engine import Database
 from app.language.times import begin_of_shift, end_of_shift
-from app.loop.notifications import addresses, means, notifier, sending
-from app.loop.notifications.addresses import Refused, place_of
+from app.loop.notifications import means, notifier, sending
 from app.loop.notifications.means import Answer, Job, Message, deliver
 from app.loop.notifications.picture import OUT
-from app.loop.notifications.schemas import RouteIn
-from app.loop.notifications.tables import NotificationRoute, Receiver
+from app.loop.notifications.tables import Receiver
 from app.settings import Settings
 from tests.conftest import NewDatabase, drop_database
 from tests.in_process import InProcess, in_process
-from tests.loop.notifications.sinks import Hooks, Mails, certificate, mail_server, secure, web_server
+from tests.loop.notifications.sinks import NETWORKS, Hooks, Mails
 from tests.loops import run
 from tests.shop import Shop, unique
 from tests.waits import until
-
-NETWORKS: dict[str, Any] = {"webhook_networks": "127.0.0.0/8"}
-
-
-@pytest.fixture(scope="module")
-def hooks() -> Iterator[Hooks]:
-    with web_server() as made:
-        yield made
-
-
-@pytest.fixture(scope="module")
-def mails() -> Iterator[tuple[Mails, str]]:
-    with mail_server() as made:
-        yield made
 
 
 @pytest.fixture(scope="module")
@@ -352,247 +332,6 @@ def test_a_route_of_an_older_version_has_not_changed_when_it_is_saved(shop: Shop
     assert {name for name in changed["after"] if changed["before"][name] != changed["after"][name]} == {"repeat"}
 
 
-# --- one step of it at a time
-
-
-def machine(session: Any) -> int:
-    return session.scalar(text("INSERT INTO machine (key, name, control) VALUES ('m', 'M', 'other') RETURNING id")) or 0
-
-
-def raise_alarm(session: Any, kind: str = "offset_limit") -> None:
-    session.execute(
-        text("INSERT INTO alarm (machine_id, tool_memory, kind) SELECT id, 1, :kind FROM machine"), {"kind": kind}
-    )
-
-
-@pytest.fixture
-def routed(database: Database) -> Database:
-    """A machine, a receiver and a route."""
-    with database.begin() as session:
-        machine(session)
-        session.add(Receiver(name="Anna", means="mail", address="anna@example.com", created_by="tests"))
-        session.flush()
-        number = session.scalar(text("SELECT id FROM receiver"))
-        rule = RouteIn(name="All", steps=[{"receivers": [number]}])  # type: ignore[list-item]
-        stored = rule.model_dump(mode="json", exclude={"name", "enabled"})
-        session.add(NotificationRoute(name="All", rule=stored, created_by="tests"))
-    return database
-
-
-def planned(database: Database) -> list[Job]:
-    with database.begin() as session:
-        return sending.plan(session, "http://inband.test", frozenset())
-
-
-def test_nothing_is_announced_before_it_is_committed(routed: Database) -> None:
-    with routed.begin() as session:
-        raise_alarm(session)
-        assert planned(routed) == []
-    (job,) = planned(routed)
-    assert job.message.subject == "Offset limit: M, tool 1"
-
-
-def test_an_alarm_that_cannot_be_worded_keeps_no_other_waiting(routed: Database) -> None:
-    with routed.begin() as session:
-        raise_alarm(session, "hunting")  # without the numbers that its sentence names
-        raise_alarm(session)
-        raise_alarm(session, "tool_worn")
-    (job,) = planned(routed)
-    assert job.message.subject == "3 alarms: Tool worn, Hunting … – M", "the most urgent first"
-
-
-def test_one_process_plans_at_a_time_and_what_it_has_begun_is_its_own(routed: Database) -> None:
-    with routed.begin() as session:
-        raise_alarm(session)
-    with routed.begin() as session:
-        assert len(sending.plan(session, "", frozenset())) == 1
-        assert planned(routed) == []
-    assert planned(routed) == []
-
-
-def test_what_a_server_has_left_behind_is_sent_again(routed: Database) -> None:
-    with routed.begin() as session:
-        raise_alarm(session)
-    (left,) = planned(routed)
-    with routed.begin() as session:
-        session.execute(text("UPDATE receiver SET busy_until = now()"))
-        session.execute(text("UPDATE delivery SET asked_at = now() - interval '1 hour'"))
-    (again,) = planned(routed)
-    assert again.delivery > left.delivery
-    assert again.alarms == left.alarms
-    with routed.begin() as session:
-        states = session.scalars(text("SELECT state FROM delivery ORDER BY id")).all()
-        assert states == ["lost", "sending"]
-        sending.end(session, again, Answer(delivered=True, text="250"))
-    assert planned(routed) == []
-
-
-def test_a_mail_that_may_have_arrived_is_tried_again_after_its_minute(routed: Database) -> None:
-    with routed.begin() as session:
-        raise_alarm(session)
-    (job,) = planned(routed)
-    with routed.begin() as session:
-        sending.end(session, job, Answer(delivered=False, text="?", perhaps=True))
-        session.execute(text("UPDATE receiver SET retry_at = now()"))
-    assert planned(routed) == []
-    with routed.begin() as session:
-        session.execute(text("UPDATE receiver SET last_at = last_at - interval '1 minute'"))
-    assert len(planned(routed)) == 1
-
-
-def test_receivers_that_fail_keep_nobody_waiting(routed: Database, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(sending, "MOST_AT_ONCE", 1)
-    with routed.begin() as session:
-        raise_alarm(session)
-        session.execute(text("UPDATE receiver SET failures = 1"))
-        other = Receiver(name="Ben", means="mail", address="ben@example.com", created_by="tests")
-        session.add(other)
-        session.flush()
-        rule = RouteIn(name="Ben", steps=[{"receivers": [other.id]}])  # type: ignore[list-item]
-        stored = rule.model_dump(mode="json", exclude={"name", "enabled"})
-        session.add(NotificationRoute(name="Ben", rule=stored, created_by="tests"))
-    assert [job.address for job in planned(routed)] == ["ben@example.com"]
-
-
-def test_two_receivers_with_one_address_are_one_person(routed: Database) -> None:
-    with routed.begin() as session:
-        raise_alarm(session)
-        session.add(Receiver(name="A. B.", means="mail", address="Anna@Example.com", created_by="tests"))
-        session.flush()
-        numbers = session.scalars(text("SELECT id FROM receiver ORDER BY id")).all()
-        rule = RouteIn(name="Both", repeat=5, steps=[{"receivers": list(numbers)}])  # type: ignore[list-item]
-        stored = rule.model_dump(mode="json", exclude={"name", "enabled"})
-        session.add(NotificationRoute(name="Both", rule=stored, created_by="tests"))
-    (job,) = planned(routed)
-    with routed.begin() as session:
-        sending.end(session, job, Answer(delivered=True, text="250"))
-    assert planned(routed) == []
-    with routed.begin() as session:
-        session.execute(text("UPDATE receiver SET last_at = last_at - interval '2 minutes'"))
-    assert planned(routed) == [], "the alarm is announced"
-    with routed.begin() as session:
-        session.execute(text("UPDATE announced SET at = at - interval '5 minutes'"))
-    (reminder,) = planned(routed)
-    assert reminder.message.subject.startswith("Reminder: ")
-
-
-def test_somebody_whose_access_has_ended_gets_nothing(routed: Database) -> None:
-    with routed.begin() as session:
-        raise_alarm(session)
-        session.execute(
-            text(
-                "WITH p AS (INSERT INTO person (name, role, password_hash, disabled_at)"
-                " VALUES ('Anna', 'viewer', '', now()) RETURNING id) UPDATE receiver SET person_id = p.id FROM p"
-            )
-        )
-    assert planned(routed) == []
-
-
-def test_what_is_old_is_forgotten(routed: Database) -> None:
-    with routed.begin() as session:
-        raise_alarm(session)
-    (job,) = planned(routed)
-    with routed.begin() as session:
-        sending.end(session, job, Answer(delivered=True, text="250"))
-    with routed.begin() as session:
-        session.execute(text("UPDATE delivery SET asked_at = now() - interval '32 days'"))
-        session.execute(text("UPDATE announced SET at = now() - interval '32 days'"))
-        sending.forget_old(session)
-        assert session.scalar(text("SELECT count(*) FROM delivery")) == 0
-        assert session.scalar(text("SELECT count(*) FROM announced")) == 1, "the alarm is still active"
-        acknowledged = "acknowledged_at = now(), acknowledged_by = 'anna', action = 'noted', comment = 'Seen'"
-        session.execute(text(f"UPDATE alarm SET {acknowledged}"))  # noqa: S608 - words of this file
-        sending.forget_old(session)
-        assert session.scalar(text("SELECT count(*) FROM announced")) == 0
-
-
-# --- where messages may go
-
-
-def found(monkeypatch: pytest.MonkeyPatch, *addresses: str) -> None:
-    """Let the name service answer this."""
-
-    def answers(_host: str, port: int, **_more: Any) -> list[Any]:
-        return [(socket.AF_INET6 if ":" in each else socket.AF_INET, 1, 6, "", (each, port)) for each in addresses]
-
-    monkeypatch.setattr("app.loop.notifications.addresses.socket.getaddrinfo", answers)
-
-
-PUBLIC = "93.184.215.14"
-
-
-@pytest.mark.parametrize(
-    "inside",
-    ["127.0.0.1", "10.1.2.3", "169.254.169.254", "::1", "::ffff:10.0.0.1", "64:ff9b::a00:1", "2002:a00:1::", "fd00::1",
-     "0.0.0.0", "224.0.0.1", "::10.0.0.1", "::ffff:0:10.0.0.1", "64:ff9b:1::a00:1", "fec0::1", "fe80::1%1"],
-)  # fmt: skip
-def test_addresses_inside_the_network_are_refused_unless_permitted(
-    monkeypatch: pytest.MonkeyPatch, inside: str
-) -> None:
-    found(monkeypatch, PUBLIC, inside)
-    with pytest.raises(Refused, match="INBAND_WEBHOOK_NETWORKS"):
-        place_of("https://andon.example/x", Settings())
-
-
-def test_public_addresses_need_https(monkeypatch: pytest.MonkeyPatch) -> None:
-    found(monkeypatch, PUBLIC)
-    with pytest.raises(Refused, match="https"):
-        place_of("http://andon.example/x", Settings())
-    assert str(place_of("https://andon.example/x", Settings()).address) == PUBLIC
-    permitted = Settings(webhook_networks="93.184.0.0/16")
-    assert place_of("http://andon.example/x", permitted).port == 80
-
-
-def test_a_name_service_that_hangs_holds_no_request_and_each_delivery_looks_again(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    over = Event()
-    monkeypatch.setattr(addresses, "LOOK_UP", 0.05)
-    monkeypatch.setattr(addresses, "_LOOKING", BoundedSemaphore(2))
-    monkeypatch.setattr(
-        "app.loop.notifications.addresses.socket.getaddrinfo", lambda *_args, **_more: over.wait(60) and []
-    )
-    try:
-        for _each in range(4):  # beyond as many as may hang, too
-            addresses.check("webhook", "https://andon.example/x", Settings())
-        assert not over.is_set()
-    finally:
-        over.set()
-
-
-def test_a_name_that_leads_inside_is_refused_when_it_is_added(monkeypatch: pytest.MonkeyPatch) -> None:
-    found(monkeypatch, "10.1.2.3")
-    with pytest.raises(Refused, match="INBAND_WEBHOOK_NETWORKS"):
-        addresses.check("webhook", "https://andon.example/x", Settings())
-
-
-def webhook(url: str) -> Job:
-    return Job(1, 1, "test", "webhook", url, "secret", Message("Test", "", {"type": "test"}))
-
-
-def test_the_address_that_was_checked_is_the_one_connected_to(monkeypatch: pytest.MonkeyPatch, hooks: Hooks) -> None:
-    found(monkeypatch, "127.0.0.1")  # only that look is answered; the connection asks nobody
-    path = f"/{unique('hook')}"
-    url = f"http://no-such-name.invalid:{hooks.server_port}{path}"
-    answer = run(deliver(webhook(url), Settings(**NETWORKS)))
-    assert answer == Answer(delivered=True, text="204 No Content")
-    (post,) = [post for post in hooks.posts if post.path == path]
-    assert post.headers["host"] == f"no-such-name.invalid:{hooks.server_port}"
-
-
-def test_a_webhook_that_nobody_answers_says_what_to_look_at() -> None:
-    answer = run(deliver(webhook("http://127.0.0.1:9/"), Settings(**NETWORKS)))
-    assert not answer.delivered
-    assert "check its address" in answer.text
-
-
-def test_webhooks_do_not_lead_to_a_server_that_only_listens_inside(hooks: Hooks) -> None:
-    answer = run(deliver(webhook(f"{hooks.url}/secret"), Settings()))
-    assert not answer.delivered
-    assert "INBAND_WEBHOOK_NETWORKS" in answer.text
-    assert hooks.at("/secret") == []
-
-
 @pytest.mark.parametrize("address", ["https://10.1.2.3/x", "http://[::ffff:10.1.2.3]/x", "https://169.254.169.254/"])
 def test_a_webhook_inside_the_network_is_refused_when_it_is_added(shop: Shop, address: str) -> None:
     """Whoever adds it is the one who can put it right; a delivery that fails at night reaches nobody."""
@@ -607,125 +346,6 @@ def test_a_webhook_inside_the_network_is_refused_when_it_is_added(shop: Shop, ad
         assert [each["field"] for each in problem["errors"]] == ["address"]
         assert "INBAND_WEBHOOK_NETWORKS" in problem["errors"][0]["message"]
     assert shop.call("GET", f"/notifications/receivers/{andon['id']}")["address"] == andon["address"]
-
-
-def mail(server: str, to: str = "anna@example.com", **settings: Any) -> Answer:
-    job = Job(1, 1, "test", "mail", to, None, Message("Tool\r\nworn", "Text\n"))
-    return run(deliver(job, Settings(mail_server=server, **settings)))
-
-
-class TestWhatAMailServerSays:
-    def test_a_refusal_is_on_record_in_its_words(self, mails: tuple[Mails, str]) -> None:
-        answer = mail(mails[1], "refused@example.com", mail_security="none")
-        assert answer == Answer(delivered=False, text="550 Nema korisnika „Đoka“")
-
-    def test_a_mail_that_was_taken_is_taken_whatever_follows(self, mails: tuple[Mails, str]) -> None:
-        assert mail(mails[1], "rude@example.com", mail_security="none").delivered
-
-    def test_one_that_does_not_answer_may_have_taken_it(
-        self, mails: tuple[Mails, str], monkeypatch: pytest.MonkeyPatch
-    ) -> None:
-        monkeypatch.setattr(means, "LIMIT", 0.5)
-        answer = mail(mails[1], "mute@example.com", mail_security="none")
-        assert (answer.delivered, answer.perhaps) == (False, True)
-        assert [each["To"] for each in mails[0].mails].count("mute@example.com") == 1
-
-    def test_one_that_is_not_there_has_not(self) -> None:
-        assert not mail("localhost:9", mail_security="none").perhaps
-
-    @pytest.mark.parametrize("security", ["none", "starttls", "tls"])
-    @pytest.mark.parametrize(
-        ("failure", "said"),
-        [
-            (
-                socket.gaierror(-2, "Name or service not known"),
-                "the name of the mail server mail.example is not known here",
-            ),
-            (ConnectionRefusedError(111, "Connection refused"), "no mail server listens at mail.example"),
-            (TimeoutError("timed out"), "mail.example does not answer"),
-        ],
-    )
-    def test_what_cannot_be_reached_says_which_setting_to_look_at(
-        self, monkeypatch: pytest.MonkeyPatch, failure: OSError, said: str, security: str
-    ) -> None:
-        def fails(*_where: Any, **_how: Any) -> None:
-            raise failure
-
-        monkeypatch.setattr(socket, "create_connection", fails)
-        answer = mail("mail.example", mail_security=security)
-        assert said in answer.text
-        assert "check INBAND_MAIL_SERVER" in answer.text
-        assert not answer.perhaps, "nothing was under way"
-
-    def test_a_sender_that_is_refused_and_a_sign_in_that_is_not_offered(self, mails: tuple[Mails, str]) -> None:
-        answer = mail(mails[1], mail_security="none", mail_user="anna", mail_password="secret")
-        assert "INBAND_MAIL_USER" in answer.text
-        answer = mail(mails[1], mail_security="none", mail_from="refused@example.com")
-        assert answer.text == "553 Not yours; check INBAND_MAIL_FROM"
-
-
-class TestEncryption:
-    def test_a_mail_server_without_it_gets_nothing(self, mails: tuple[Mails, str]) -> None:
-        before = len(mails[0].mails)
-        answer = mail(mails[1])
-        assert not answer.delivered
-        assert "offers no STARTTLS: INBAND_MAIL_SECURITY" in answer.text
-        assert len(mails[0].mails) == before
-
-    def test_its_certificate_has_to_be_known(self, tmp_path: Path) -> None:
-        pem = certificate(tmp_path)
-        with mail_server(secure(pem)) as (sink, server):
-            refused = mail(server)
-            assert refused.text.startswith("certificate refused: ")
-            assert "INBAND_CA_FILE" in refused.text
-            assert sink.mails == []
-            assert mail(server, ca_file=pem).delivered
-        assert sink.encrypted == [True]
-        assert sink.mails[0]["Subject"] == "Tool worn"
-
-    def test_from_the_first_byte(self, tmp_path: Path) -> None:
-        pem = certificate(tmp_path)
-        with mail_server(secure(pem), first=True) as (sink, server):
-            assert mail(server, mail_security="tls", ca_file=pem).delivered
-            assert "INBAND_CA_FILE" in mail(server, mail_security="tls").text
-        assert len(sink.mails) == 1
-
-    def test_the_wrong_kind_says_which_setting_it_is(
-        self, tmp_path: Path, mails: tuple[Mails, str], monkeypatch: pytest.MonkeyPatch
-    ) -> None:
-        monkeypatch.setattr(means, "STEP", 0.3)
-        assert "INBAND_MAIL_SECURITY=starttls" in mail(mails[1], mail_security="tls").text
-        with mail_server(secure(certificate(tmp_path)), first=True) as (_sink, server):
-            assert "INBAND_MAIL_SECURITY=tls" in mail(server).text
-
-    def test_a_file_without_a_certificate_is_refused_at_the_start(self, tmp_path: Path) -> None:
-        (tmp_path / "ca.pem").write_text("no certificate")
-        with pytest.raises(ValueError, match="no certificate of an authority"):
-            Settings(ca_file=tmp_path / "ca.pem")
-
-    @pytest.mark.parametrize("way", ["PLAIN", "LOGIN"])
-    @pytest.mark.parametrize("password", ["secret", "šifra ß"])
-    def test_it_signs_in(self, tmp_path: Path, password: str, way: str) -> None:
-        def knows(_server: Any, _session: Any, _envelope: Any, _mechanism: str, data: Any) -> AuthResult:
-            right = (data.login, data.password) == (b"anna", password.encode())
-            return AuthResult(success=right, handled=False)
-
-        pem = certificate(tmp_path)
-        others = [other for other in ("PLAIN", "LOGIN") if other != way]
-        door: dict[str, Any] = {"authenticator": knows, "auth_required": True, "auth_exclude_mechanism": others}
-        with mail_server(secure(pem), **door) as (sink, server):
-            assert mail(server, ca_file=pem, mail_user="anna", mail_password=password).delivered
-            refused = mail(server, ca_file=pem, mail_user="anna", mail_password=f"not {password}")
-            assert refused.text.startswith("535 ")
-            assert "INBAND_MAIL_PASSWORD" in refused.text
-        assert len(sink.mails) == 1
-
-    def test_without_a_mail_server_it_says_what_to_set(self) -> None:
-        job = Job(1, 1, "test", "mail", "anna@example.com", None, Message("Test", "Text\n"))
-        assert "INBAND_MAIL_SERVER" in run(deliver(job, Settings())).text
-
-
-# --- setting it up
 
 
 class TestSetUp:

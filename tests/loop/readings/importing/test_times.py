@@ -18,7 +18,7 @@ from app.loop.readings.aqdef.sorting import Wishes as AqdefWishes
 from app.loop.readings.importing.cells import Flaw
 from app.loop.readings.importing.layout import Wishes, look
 from app.loop.readings.importing.lines import Line, lines
-from tests.bridge.kinds.test_folder import machine
+from tests.bridge.kinds.measured_folder import machine
 from tests.loop.readings.importing.test_history import plant, run  # noqa: F401 - a fixture
 from tests.loop.readings.record import rows
 
