@@ -27,7 +27,7 @@ from app.access.keys import add_key
 from app.core.parameters import read
 from app.db.engine import Database
 from bench.plant import free_port, wait_until_ready
-from tests.conftest import make_whole
+from tests.databases import make_whole
 from tests.db.clusters import cluster, wait_for
 from tests.db.managed import MISSING, managed
 from tests.loop.readings.load import Sender, all_at_once, scattered

@@ -14,7 +14,7 @@ from starlette.types import ASGIApp, Message
 from app.db.engine import Database
 from app.language.times import keep_time_of, plant_time
 from app.settings import Settings
-from tests.conftest import Server
+from tests.servers import Server
 
 
 class Direct(httpx.BaseTransport):

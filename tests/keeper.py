@@ -38,7 +38,7 @@ IN_ORDER = 6.0  # s that an interrupted run may take to end by itself
 # Seconds in which what a finished run has started ends by itself; on a busy computer a fork server takes some.
 BY_ITSELF = 60.0
 # PostgreSQL inherits no environment. Its cluster lies in a folder that is locked as long as the run lasts: pytest's, or one
-# of `tests.conftest.short_folder`.
+# of `tests.databases.short_folder`.
 CLUSTER = re.compile(rb"postgres\0-D\0(/[^\0]*/(?:pytest-of-[^/\0]+/pytest-\d+|inband-test-[^/\0]+))/")
 MEMORY, ROOM = Path("/dev/shm"), 4 * 2**30  # bytes that are free there and in memory, or the run uses the disk  # noqa: S108
 # PostgreSQL waits for its clients at SIGTERM and ends at once at SIGQUIT.

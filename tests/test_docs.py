@@ -17,7 +17,8 @@ from app.db.embedded import EmbeddedServer
 from app.db.engine import Database
 from app.settings import Settings, variable_of
 from docs import generate
-from tests.conftest import Server, begun, free_port, short_folder, wait_ready
+from tests.databases import short_folder
+from tests.servers import Server, begun, free_port, wait_ready
 from tests.shop import Shop
 
 BLOCK = re.compile(r"^```(\w+)\n(.*?)^```$", re.DOTALL | re.MULTILINE)

@@ -6,7 +6,7 @@ from sqlalchemy import text
 from sqlalchemy.orm import Session
 
 from app.db.engine import Database
-from tests.conftest import Server
+from tests.servers import Server
 
 
 @pytest.mark.parametrize("_", [1, 2])

@@ -27,7 +27,8 @@ from app.db.engine import Database
 from app.db.run_as import run_as
 from app.settings import Settings
 from tests import keeper
-from tests.conftest import Process, Server, free_port, short_folder, wait_ready
+from tests.databases import short_folder
+from tests.servers import Process, Server, free_port, wait_ready
 from tests.shop import Shop
 
 NAME = f"inband-{__version__}"

@@ -35,10 +35,11 @@ from app.loop.summaries.queries.window import Window
 from app.loop.tables.readings import ResultReading
 from app.views.shift import queries as shift
 from bench.plant import PARAMETERS
-from tests.conftest import MANY, RunServer, drop_database, in_database
+from tests.databases import MANY, drop_database, in_database
 from tests.forked import inband
 from tests.loop.readings.importing.test_history import set_up
 from tests.loops import in_thread, run
+from tests.servers import RunServer
 
 KEY = "long"
 SOME_OR_ALL = [20_000, pytest.param(MANY, marks=pytest.mark.long)]

@@ -7,7 +7,8 @@ from pathlib import Path
 import pytest
 
 from app.db.engine import Database
-from tests.conftest import NewDatabase, Process, Server, drop_database, free_port, wait_ready
+from tests.databases import NewDatabase, drop_database
+from tests.servers import Process, Server, free_port, wait_ready
 from tests.shop import Shop
 from tests.test_installed import run
 

@@ -6,7 +6,7 @@ from typing import Any
 import httpx
 import pytest
 
-from tests.conftest import Server
+from tests.servers import Server
 from tests.shop import PARAMETERS, Shop
 
 ROLES = ["nobody", "machine", "other machine", "viewer", "operator", "engineer", "admin"]

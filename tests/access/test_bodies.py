@@ -20,7 +20,7 @@ from app.web import json_bodies
 from app.web.deps import SAFE_METHODS
 from app.web.limits import FEW, MEGABYTE, Takes
 from tests.access.pieces import PIECE, arrive, send
-from tests.conftest import NewDatabase, drop_database
+from tests.databases import NewDatabase, drop_database
 from tests.in_process import Direct, InProcess, in_process
 from tests.loops import run
 from tests.shop import Person, Shop

@@ -18,7 +18,7 @@ from app.access import passwords
 from app.access.tables import Person
 from app.memory import NICE
 from app.settings import Settings
-from tests.conftest import RunServer
+from tests.servers import RunServer
 from tests.shop import PASSWORD
 
 LEAST_MEMORY = 64 * 1024  # KiB

@@ -3,7 +3,7 @@
 import pytest
 
 from bench.bodies import WANTED, Request, addresses, bodies, held, requests
-from tests.conftest import Server
+from tests.servers import Server
 
 
 @pytest.mark.long

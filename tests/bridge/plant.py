@@ -16,7 +16,7 @@ from app.bridge.unit import Unit, ended
 from app.core.ring import Register
 from app.simulators.controls.model import Feature, Model
 from inband_client import AsyncClient
-from tests.conftest import TLS
+from tests.servers import TLS
 from tests.shop import Shop
 
 PATIENCE = 60.0  # s: of a machine under load

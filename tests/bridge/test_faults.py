@@ -8,7 +8,7 @@ import pytest
 
 from app.simulators.controls.mqtt import mosquitto
 from bench.bridge_faults import KINDS, Campaign
-from tests.conftest import Server
+from tests.servers import Server
 from tests.shop import unique
 
 pytestmark = pytest.mark.own_server

@@ -21,9 +21,9 @@ from app.simulators.controls.mqtt import mosquitto
 from app.simulators.controls.opcua import Nc
 from bench.outcome import TOLERANCE, Play, Process
 from tests.bridge.test_outcome import START, applied, play
-from tests.conftest import TLS, Server
 from tests.loop.connections.test_alarms import gap, later
 from tests.loop.tools.test_untaken import age_corrections
+from tests.servers import TLS, Server
 from tests.shop import Shop
 
 WAYS = ["rest", "haas", "haas direct", "heidenhain", "mqtt", "opcua", "opcua direct"]

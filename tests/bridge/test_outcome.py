@@ -13,8 +13,8 @@ from app.loop.tools.untaken import Watch
 from app.simulators.controls.model import OWNERS, UNMAPPED, Steps
 from app.simulators.controls.mqtt import mosquitto
 from bench.outcome import KINDS, WORST, Outcome, Play, Process
-from tests.conftest import TLS, Server
 from tests.loop.tools.test_untaken import age_corrections
+from tests.servers import TLS, Server
 from tests.shop import unique
 
 

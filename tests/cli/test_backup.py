@@ -8,7 +8,8 @@ import psycopg
 
 from app.db import migrate
 from tests import forked
-from tests.conftest import RunServer, in_database
+from tests.databases import in_database
+from tests.servers import RunServer
 from tests.shop import Shop
 
 inband = partial(forked.inband, expect=0)

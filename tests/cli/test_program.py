@@ -5,7 +5,7 @@ from functools import partial
 from pathlib import Path
 
 from tests import forked
-from tests.conftest import Server
+from tests.servers import Server
 from tests.shop import Shop
 
 L15 = "L15\nN5 R103 R115 R240 R250\nN10 R33=0.001 R440.0053 R361 R370.3\nN12 R33=R50*2\nN15 R400 R41-0.016 R4240\nN20 L75\nN25 L93\nN30 M17\n"

@@ -19,9 +19,10 @@ from app import HOUSE, __version__
 from app.db import migrate
 from app.db.embedded import EmbeddedServer
 from tests import keeper
-from tests.conftest import TLS, NewDatabase, RunServer, Server, copied, free_port, in_database, short_folder, wait_ready
+from tests.databases import NewDatabase, copied, in_database, short_folder
 from tests.db.clusters import wait_for
 from tests.forked import Forked, inband
+from tests.servers import TLS, RunServer, Server, free_port, wait_ready
 
 
 @pytest.fixture

@@ -20,7 +20,7 @@ from inband_client import (
     Unavailable,
 )
 from tests.client.conftest import Connect, Either
-from tests.conftest import RunServer, Server, free_port
+from tests.servers import RunServer, Server, free_port
 from tests.shop import Shop
 
 

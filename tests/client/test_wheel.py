@@ -14,7 +14,7 @@ import pytest
 from packaging.requirements import Requirement
 
 from app import HOUSE, __version__
-from tests.conftest import Server
+from tests.servers import Server
 from tests.shop import Shop
 from tests.test_installed import bare, build
 

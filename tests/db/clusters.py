@@ -19,7 +19,7 @@ import psycopg
 from app.db.binaries import binary
 from app.db.embedded import ENVIRONMENT, EmbeddedServer, _children
 from app.db.run_as import give
-from tests.conftest import copied
+from tests.databases import copied
 
 NODES = ("one", "two", "three")
 ALWAYS = {"fsync": "off"}  # no test pulls the plug
@@ -214,7 +214,7 @@ def _touch(path: Path, node: EmbeddedServer) -> None:
 
 @contextmanager
 def cluster(folder: Path, whole: Path, names: Sequence[str] = NODES) -> Iterator[Cluster]:
-    """Servers that run, and end with the block. whole: of `tests.conftest.whole_cluster`."""
+    """Servers that run, and end with the block. whole: of `tests.databases.whole_cluster`."""
     made = Cluster(folder, names)
     try:
         made.start(whole)

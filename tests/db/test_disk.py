@@ -9,7 +9,7 @@ import pytest
 
 from app.cli import main
 from app.db import disk
-from tests.conftest import NewDatabase
+from tests.databases import NewDatabase
 
 
 def test_a_disk_with_room_is_no_matter(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

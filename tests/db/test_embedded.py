@@ -19,7 +19,7 @@ from app.db import binaries, embedded
 from app.db.binaries import BinariesError, binary
 from app.db.embedded import EmbeddedServer, EmbeddedServerError, _children
 from app.db.run_as import run_as
-from tests.conftest import copied, short_folder
+from tests.databases import copied, short_folder
 
 AS_ROOT = os.geteuid() == 0
 USE = """

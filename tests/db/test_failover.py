@@ -8,10 +8,11 @@ import pytest
 
 from app.core.parameters import read
 from bench import failover
-from tests.conftest import RunServer, Server, short_folder
+from tests.databases import short_folder
 from tests.db.clusters import Cluster, cluster
 from tests.loop.readings.record import history, must_hold, must_replay, rows
 from tests.loop.readings.writer.test_broken import push, until
+from tests.servers import RunServer, Server
 from tests.shop import PARAMETERS, Shop, unique
 
 PATIENCE = "1"  # s

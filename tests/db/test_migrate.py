@@ -12,8 +12,9 @@ from app.cli.base import existing_url
 from app.db import migrate
 from app.db.migrate import MigrationError
 from app.settings import Settings
-from tests.conftest import NewDatabase, RunServer
+from tests.databases import NewDatabase
 from tests.db.first_program import ADMIN_KEY, ANA, MACHINE_KEY, move
+from tests.servers import RunServer
 from tests.waits import until
 
 

@@ -5,9 +5,10 @@ from collections.abc import Iterator
 import pytest
 
 from bench import failover
-from tests.conftest import RunServer, short_folder
+from tests.databases import short_folder
 from tests.db.managed import MISSING, Managed, managed
 from tests.forked import inband
+from tests.servers import RunServer
 
 pytestmark = [
     pytest.mark.long,

@@ -10,8 +10,9 @@ from sqlalchemy import make_url
 from app.db import migrate
 from app.db.base import whole_metadata
 from app.db.rights import APPEND_ONLY, WITH_A_LIFE, rights_of
-from tests.conftest import NewDatabase, RunServer, Server, drop_database
+from tests.databases import NewDatabase, drop_database
 from tests.forked import inband
+from tests.servers import RunServer, Server
 from tests.shop import Shop
 
 ROLE = "inband_serving"

@@ -19,11 +19,11 @@ from app.db.binaries import binary
 from app.db.connections import Connections
 from app.db.embedded import EmbeddedServer
 from app.db.engine import Database
-from tests.conftest import RunServer, Server
 from tests.db.clusters import commits_wait_for
 from tests.db.network import Way
 from tests.loop.readings.record import history, must_hold, rows
 from tests.loop.readings.writer.test_broken import at_work, crew, nothing_lost_or_doubled, push, until, until_taken
+from tests.servers import RunServer, Server
 from tests.shop import Person, Shop
 
 PATIENCE = "2"  # s

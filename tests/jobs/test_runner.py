@@ -15,7 +15,7 @@ from app.db.engine import Database
 from app.jobs.actions import WHOLE, DatabaseGone, PeriodicJob, Unit, run_jobs, whole
 from app.jobs.queries import failures, runs
 from app.jobs.runner import JobRunner
-from tests.conftest import in_database
+from tests.databases import in_database
 from tests.loops import run
 
 ADD = text("INSERT INTO machine (key, name, control) VALUES (:key, 'Lathe', 'other')")

@@ -15,7 +15,7 @@ from playwright.sync_api import Browser, Page, expect
 from pypdf import PdfReader
 
 from app.access import devices
-from tests.conftest import Server, new_page
+from tests.browsers import new_page
 from tests.pages.house import ADDRESSES, PAGES, furnished, values_of
 from tests.pages.looks import (
     SIZES,
@@ -29,6 +29,7 @@ from tests.pages.looks import (
     violations,
 )
 from tests.pages.words import flaws_in
+from tests.servers import Server
 from tests.shop import Person, Shop
 
 pytestmark = pytest.mark.own_server  # pages of the whole plant show this house and nothing else

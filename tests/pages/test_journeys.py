@@ -10,8 +10,8 @@ from urllib.parse import urlsplit
 import pytest
 from playwright.sync_api import Locator, Page, expect
 
-from tests.conftest import Server
 from tests.pages.looks import live, until_shown
+from tests.servers import Server
 from tests.shop import Person, Shop
 
 pytestmark = pytest.mark.own_server  # everybody begins at the plant page, which shows a plant and no crowd

@@ -25,11 +25,12 @@ from app.db.connections import in_schema
 from app.db.embedded import EmbeddedServer
 from app.db.engine import Database
 from app.errors import Invalid, NotFound
-from tests.conftest import TLS, RunServer, Server, short_folder
+from tests.databases import short_folder
 from tests.db.clusters import kill, wait_for
 from tests.loop.readings.load import Sender, all_at_once, scattered
 from tests.loop.readings.record import history, must_replay
 from tests.plants.nodes import PROGRAMS, nodes, place
+from tests.servers import TLS, RunServer, Server
 from tests.shop import PARAMETERS
 from tests.web.test_live import stream
 

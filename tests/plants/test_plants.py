@@ -20,9 +20,10 @@ from app.db.connections import in_schema
 from app.db.engine import Database
 from app.errors import Conflict, Invalid, NotFound
 from app.plants import registry
-from tests.conftest import TLS, NewDatabase, RunServer, Server, drop_database
+from tests.databases import NewDatabase, drop_database
 from tests.forked import inband
 from tests.pages.looks import violations
+from tests.servers import TLS, RunServer, Server
 from tests.shop import PARAMETERS
 from tests.waits import until
 

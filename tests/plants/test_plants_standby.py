@@ -9,9 +9,10 @@ import httpx
 import pytest
 
 from app.access import actions as people
-from tests.conftest import RunServer, Server, short_folder
+from tests.databases import short_folder
 from tests.db.clusters import Cluster, cluster
 from tests.plants.test_plants import PASSWORD, add, client_of, get, in_plant, is_ready, read, set_up
+from tests.servers import RunServer, Server
 from tests.shop import PARAMETERS
 from tests.waits import until
 from tests.web.test_replica import BEHIND, paused

@@ -13,7 +13,7 @@ import pytest
 
 from app.jobs.runner import JobRunner
 from tests import chance
-from tests.conftest import NewDatabase, drop_database
+from tests.databases import NewDatabase, drop_database
 from tests.in_process import InProcess, in_process
 from tests.loop.readings.record import must_hold
 from tests.shop import Shop

@@ -11,7 +11,7 @@ import pytest
 import uvicorn
 from playwright.sync_api import Browser, Page
 
-from tests.conftest import TLS, free_port
+from tests.servers import TLS, free_port
 from tests.web.showcase import Stage, showcase
 
 

@@ -7,7 +7,7 @@ import pytest
 from playwright.sync_api import Page, expect
 
 from app.web.api_docs import _kind, curl, prose
-from tests.conftest import Server
+from tests.servers import Server
 from tests.web.api_operations import operations
 
 

@@ -17,9 +17,10 @@ import psycopg
 import pytest
 
 from app.loop.notifications import notifier
-from tests.conftest import NewDatabase, Server, drop_database
+from tests.databases import NewDatabase, drop_database
 from tests.in_process import InProcess, in_process
 from tests.loop.readings.record import counted
+from tests.servers import Server
 from tests.web.api_operations import Operation, body_schema, operation_named, operations, resolved
 from tests.web.good_bodies import BODIES
 from tests.web.whole_plant import Place

@@ -4,7 +4,7 @@ from typing import Any
 
 from prometheus_client.parser import text_string_to_metric_families
 
-from tests.conftest import Server
+from tests.servers import Server
 from tests.shop import Shop
 
 

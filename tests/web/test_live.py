@@ -25,8 +25,9 @@ from app.db.engine import Database
 from app.db.events import publish
 from app.loop.machines import keys
 from app.web.live import MOST_MISSED, Access, Live
-from tests.conftest import RunServer, Server, copied, in_database
+from tests.databases import copied, in_database
 from tests.loops import run
+from tests.servers import RunServer, Server
 from tests.shop import Shop, unique
 
 pytestmark = pytest.mark.own_server

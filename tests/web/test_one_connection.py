@@ -7,7 +7,7 @@ from sqlalchemy import text
 
 from app.db.engine import Database
 from app.logs import REQUEST
-from tests.conftest import NewDatabase, drop_database
+from tests.databases import NewDatabase, drop_database
 from tests.in_process import InProcess, in_process
 from tests.one_connection import SecondConnection
 from tests.shop import Shop

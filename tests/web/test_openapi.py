@@ -17,8 +17,8 @@ from app.loop.readings.answers import ReadingAnswer
 from app.loop.readings.api import BatchCounts
 from app.loop.readings.schemas import ReadingIn
 from app.web.openapi import EXAMPLES, example_of, operations, resolve
-from tests.conftest import RunServer, Server
 from tests.in_process import application
+from tests.servers import RunServer, Server
 from tests.web.api_operations import document
 
 pytestmark = pytest.mark.own_server  # the examples name machines and characteristics

@@ -19,8 +19,8 @@ from app.loop.readings import exporting
 from app.loop.readings import queries as readings
 from app.views.reports.jobs_schemas import ReportsIn
 from app.web.usual_periods import field, usual_periods
-from tests.conftest import RunServer, Server
 from tests.forked import inband
+from tests.servers import RunServer, Server
 from tests.shop import Person, Shop
 
 # 02:30 is there twice in Berlin that night.

@@ -17,7 +17,7 @@ from starlette.requests import Request
 
 from app.web import protocol
 from app.web.protocol import MOST_HEAD, ServerProtocol
-from tests.conftest import TLS
+from tests.servers import TLS
 from tests.waits import until
 
 PATIENCE = 0.8  # seconds; `ServerProtocol` has more

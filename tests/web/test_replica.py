@@ -14,10 +14,11 @@ from fastapi.routing import APIRoute
 
 from app.main import ROUTERS
 from app.web.deps import FROM_REPLICA
-from tests.conftest import RunServer, Server, short_folder
+from tests.databases import short_folder
 from tests.db.clusters import Cluster, cluster
 from tests.forked import inband
 from tests.loop.readings.record import rows
+from tests.servers import RunServer, Server
 from tests.shop import PARAMETERS, Person, Shop
 from tests.waits import until
 

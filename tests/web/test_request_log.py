@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 import pytest
 
 from app.logs import without_secrets
-from tests.conftest import RunServer, Server
+from tests.servers import RunServer, Server
 from tests.shop import PASSWORD, Shop, unique
 
 

@@ -18,8 +18,9 @@ import pytest
 
 from app import HOUSE
 from app.db.engine import Database
-from tests.conftest import TLS, NewDatabase, RunServer, Server, free_port
+from tests.databases import NewDatabase
 from tests.loop.readings.writer.test_broken import at_work, crew, nothing_lost_or_doubled
+from tests.servers import TLS, RunServer, Server, free_port
 from tests.shop import Person, Shop
 from tests.waits import until
 from tests.web.test_live import Listener

@@ -7,7 +7,7 @@ from playwright.sync_api import Page, expect
 
 from app.loop.notes.pages import ON_PAGE as NOTES_ON_PAGE
 from app.views.set_up.characteristic_pages import ON_PAGE
-from tests.conftest import Server
+from tests.servers import Server
 from tests.shop import Person, Shop
 
 pytestmark = pytest.mark.own_server

@@ -9,7 +9,7 @@ import psycopg
 import pytest
 
 from app.core.geometry.frames import from_angles
-from tests.conftest import Server
+from tests.servers import Server
 from tests.shop import Person, Shop
 
 PLACES: list[tuple[list[float], str]] = [

@@ -8,7 +8,7 @@ from sqlalchemy import delete, update
 from sqlalchemy.exc import DBAPIError
 
 from app.geometry.geometric_form.tables import FormEvaluation, FormMeasurement
-from tests.conftest import Server
+from tests.servers import Server
 from tests.shop import Shop
 
 PRINTED: list[list[list[float]]] = [

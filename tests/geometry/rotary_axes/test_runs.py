@@ -5,8 +5,8 @@ from typing import Any
 
 import pytest
 
-from tests.conftest import Server
 from tests.geometry.rotary_axes.bench import NAMES, RADIUS, RUNS, TRUE, axis, enter, plan, protocol, take, touched
+from tests.servers import Server
 from tests.shop import Person, Shop
 
 

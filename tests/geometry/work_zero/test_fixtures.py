@@ -10,8 +10,8 @@ from sqlalchemy import select
 from app.geometry.work_zero import queries
 from app.geometry.work_zero.tables import WorkZero
 from app.loop.machines.queries import machine_named
-from tests.conftest import Server
 from tests.geometry.work_zero.bench import POCKET, moved, moved_along, post
+from tests.servers import Server
 from tests.shop import Shop
 
 

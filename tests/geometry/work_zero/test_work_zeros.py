@@ -13,8 +13,8 @@ from app.db.engine import Database
 from app.geometry.work_zero.tables import WorkZero
 from app.loop.readings.results_actions import push_results
 from app.settings import Settings
-from tests.conftest import Server
 from tests.geometry.work_zero.bench import POCKET, moved, post
+from tests.servers import Server
 from tests.shop import Shop
 from tests.waits import until
 

@@ -9,8 +9,8 @@ from sqlalchemy import text
 from app.jobs.actions import run_jobs
 from app.loop.connections import late_readings, server_away
 from app.loop.connections.jobs import due, job
-from tests.conftest import Server
 from tests.loop.connections.test_heartbeat import ago, beat
+from tests.servers import Server
 from tests.shop import Person, Shop
 
 MINUTE = 60.0

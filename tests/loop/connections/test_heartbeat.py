@@ -8,7 +8,7 @@ import pytest
 from sqlalchemy import text
 
 from app.loop.connections.queries import server_mark
-from tests.conftest import Server
+from tests.servers import Server
 from tests.shop import Shop
 
 BEAT: dict[str, Any] = {"version": "0.2.0", "state": "online", "waiting": 0}

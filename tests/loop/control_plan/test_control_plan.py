@@ -9,7 +9,7 @@ import pytest
 
 from app.jobs.actions import run_jobs
 from app.loop.control_plan import actions, jobs, signs
-from tests.conftest import Server
+from tests.servers import Server
 from tests.shop import Person, Shop
 
 WHY = "Agreed with quality"

@@ -4,7 +4,7 @@ from typing import Any
 
 import pytest
 
-from tests.conftest import Server
+from tests.servers import Server
 from tests.shop import Person, Shop
 
 

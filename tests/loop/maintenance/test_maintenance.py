@@ -12,7 +12,7 @@ from app.language.times import in_zone
 from app.loop.maintenance.pages import as_typed
 from app.loop.maintenance.schemas import MaintenanceIn
 from app.web.forms import typed
-from tests.conftest import Server
+from tests.servers import Server
 from tests.shop import Person, Shop
 
 WHY = {"reason": "Bearing replaced"}

@@ -11,8 +11,8 @@ from app.errors import Invalid
 from app.language.times import in_zone
 from app.loop.notes.schemas import NoteIn
 from app.web.forms import typed
-from tests.conftest import Server
 from tests.pages.looks import live
+from tests.servers import Server
 from tests.shop import Person, Shop
 from tests.views.reports.story import report, table
 

@@ -71,7 +71,7 @@ class Mails:
 @contextmanager
 def mail_server(context: SSLContext | None = None, **more: Any) -> Iterator[tuple[Mails, str]]:
     """A mail server, and its address."""
-    from tests.conftest import free_port
+    from tests.servers import free_port
 
     made = Mails(context, **more)
     made.controller.port = free_port()

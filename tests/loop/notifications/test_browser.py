@@ -17,7 +17,7 @@ from app.loop.notifications.queries import own
 from app.loop.notifications.schemas import PageIn, RouteIn
 from app.loop.notifications.tables import Delivery, NotificationRoute, Receiver
 from app.settings import Settings
-from tests.conftest import Server
+from tests.servers import Server
 from tests.shop import Person, Shop, unique
 from tests.waits import until
 

@@ -14,9 +14,10 @@ from app.loop.notifications import means, notifier, sending
 from app.loop.notifications.means import Answer, Job
 from app.loop.notifications.schemas import RouteIn
 from app.loop.notifications.tables import NotificationRoute, Receiver
-from tests.conftest import NewDatabase, drop_database, free_port
+from tests.databases import NewDatabase, drop_database
 from tests.in_process import InProcess, in_process
 from tests.loop.notifications.sinks import Hooks
+from tests.servers import free_port
 from tests.shop import Person, Shop, unique
 from tests.waits import until
 

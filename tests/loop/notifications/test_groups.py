@@ -13,7 +13,7 @@ from app.loop.notifications import sending
 from app.loop.notifications.calendar_queries import public_holidays
 from app.loop.notifications.group_schemas import GroupIn
 from app.loop.notifications.means import Job
-from tests.conftest import Server
+from tests.servers import Server
 from tests.shop import Person, Shop, unique
 from tests.waits import until
 

@@ -21,7 +21,7 @@ from app.loop.notifications.means import Answer, Job, Message, deliver
 from app.loop.notifications.picture import OUT
 from app.loop.notifications.tables import Receiver
 from app.settings import Settings
-from tests.conftest import NewDatabase, drop_database
+from tests.databases import NewDatabase, drop_database
 from tests.in_process import InProcess, in_process
 from tests.loop.notifications.sinks import NETWORKS, Hooks, Mails
 from tests.loops import run

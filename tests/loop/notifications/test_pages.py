@@ -7,7 +7,7 @@ import pytest
 from playwright.sync_api import Page, expect
 
 from app.loop.notifications.tables import Delivery, Receiver
-from tests.conftest import Server
+from tests.servers import Server
 from tests.shop import Person, Shop, unique
 
 

@@ -6,7 +6,7 @@ from typing import Any
 from app.jobs.actions import run_jobs
 from app.loop.control_plan import jobs as control_plans
 from app.loop.present_context import actions
-from tests.conftest import Server
+from tests.servers import Server
 from tests.shop import Person, Shop
 
 

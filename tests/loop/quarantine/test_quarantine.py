@@ -8,7 +8,7 @@ from typing import Any
 
 import psycopg
 
-from tests.conftest import Server
+from tests.servers import Server
 from tests.shop import Person, Shop
 
 BEGAN = datetime(2026, 11, 20, 8, tzinfo=UTC)

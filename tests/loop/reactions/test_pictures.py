@@ -5,8 +5,8 @@ from typing import Any
 
 import httpx
 
-from tests.conftest import Server
 from tests.pictures import as_json, picture
+from tests.servers import Server
 from tests.shop import Person, Shop, unique
 
 ALT = "An insert with a chip out of its edge"

@@ -8,7 +8,7 @@ import pytest
 from app.loop.alarm_response.reaction_queries import Handled, Reactions
 from app.loop.notifications.sending import _of_plans
 from app.loop.tables.reactions import ReactionPlan
-from tests.conftest import Server
+from tests.servers import Server
 from tests.shop import Person, Shop, unique
 
 

@@ -10,8 +10,8 @@ import pytest
 from app.core.context import ContextField
 from app.loop.characteristics.queries import characteristic_named
 from app.loop.summaries.queries import chart_data, window_of
-from tests.conftest import Server
 from tests.forked import inband
+from tests.servers import Server
 from tests.shop import Person, Shop
 
 COUNT = 600

@@ -4,7 +4,7 @@ from typing import Any
 
 import pytest
 
-from tests.conftest import Server
+from tests.servers import Server
 from tests.shop import Person, Shop
 
 ROUND = {"variant": "round", "points": 4, "index": 90, "average_memory": 0}

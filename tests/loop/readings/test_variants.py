@@ -5,8 +5,8 @@ from typing import Any
 
 import pytest
 
-from tests.conftest import Server
 from tests.loop.readings.record import must_hold, rows
+from tests.servers import Server
 from tests.shop import Shop
 
 pytestmark = pytest.mark.own_server  # the whole record of its database is held against the rules

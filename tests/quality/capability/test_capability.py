@@ -12,8 +12,8 @@ from app.loop.characteristics.queries import characteristic_named
 from app.quality.capability import verdict_queries
 from app.quality.capability.actions import JOB
 from app.quality.capability.verdict_queries import Verdict, verdicts_by_characteristic
-from tests.conftest import Server
 from tests.quality.closed_loop import cut, scatter
+from tests.servers import Server
 from tests.shop import Person, Shop
 
 

@@ -5,8 +5,8 @@ from typing import Any
 
 import pytest
 
-from tests.conftest import Server
 from tests.quality.capability.test_capability import judge, of, quiet
+from tests.servers import Server
 from tests.shop import Person, Shop
 
 

@@ -6,9 +6,9 @@ from typing import Any
 
 import pytest
 
-from tests.conftest import Server
 from tests.quality.closed_loop import cut, scatter
 from tests.quality.control_charts.rows import control, frozen
+from tests.servers import Server
 from tests.shop import Person, Shop
 
 D2 = 2 / sqrt(pi)  # of two readings, exactly

@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 
 from app.quality.proof.cases import FOLDER
-from tests.conftest import Server
+from tests.servers import Server
 from tests.shop import Person, Shop, unique
 
 CASES = json.loads((FOLDER / "gauge.json").read_text())

@@ -15,8 +15,8 @@ from app.quality.what_if import simulation
 from app.quality.what_if.queries import truly_of
 from app.quality.what_if.schemas import WhatIfIn
 from app.quality.what_if.tool_history import past_of
-from tests.conftest import Server
 from tests.quality.closed_loop import cut, scatter
+from tests.servers import Server
 from tests.shop import Person, Shop
 
 

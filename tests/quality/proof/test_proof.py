@@ -20,8 +20,8 @@ from app.quality.proof.queries import Proof, run
 from app.settings import Settings
 from app.web.templates import environment
 from tests import loops
-from tests.conftest import Server
 from tests.forked import inband
+from tests.servers import Server
 from tests.shop import Person
 
 

@@ -4,8 +4,8 @@ from typing import Any
 
 import pytest
 
-from tests.conftest import Server
 from tests.quality.closed_loop import scatter
+from tests.servers import Server
 from tests.shop import Person, Shop
 
 

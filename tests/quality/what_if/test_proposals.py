@@ -8,8 +8,8 @@ import psycopg
 import pytest
 from playwright.sync_api import Page, expect
 
-from tests.conftest import Server
 from tests.quality.closed_loop import cut, scatter
+from tests.servers import Server
 from tests.shop import Person, Shop
 from tests.waits import until
 

@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 
 from app.quality.what_if.tool_history import Delays, _delays
-from tests.conftest import Server
 from tests.loop.readings.importing.test_history import run, table
 from tests.quality.closed_loop import cut, scatter
 from tests.quality.control_charts.rows import frozen
+from tests.servers import Server
 from tests.shop import Person, Shop
 
 PARTS = 160

@@ -24,7 +24,7 @@ from app.simulators.demo.installing import lines, set_up
 from app.simulators.demo.running import Line, Pace
 from app.simulators.demo.simulation import Machine
 from inband_client import Client
-from tests.conftest import Server
+from tests.servers import Server
 from tests.shop import Shop, unique
 
 LONG, SHORT = 250, 100  # parts

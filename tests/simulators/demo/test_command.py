@@ -8,8 +8,9 @@ from pathlib import Path
 import httpx
 import pytest
 
-from tests.conftest import TLS, NewDatabase, Process, begun, drop_database, free_port, wait_ready
+from tests.databases import NewDatabase, drop_database
 from tests.forked import Forked
+from tests.servers import TLS, Process, begun, free_port, wait_ready
 from tests.waits import until
 
 

@@ -7,7 +7,7 @@ import pytest
 from app.simulators.demo import plant, touching
 from app.simulators.demo.installing import set_up
 from inband_client import Client
-from tests.conftest import Server
+from tests.servers import Server
 
 
 def test_a_creeping_vice_and_an_aligned_casting_are_there_once(server: Server, monkeypatch: pytest.MonkeyPatch) -> None:

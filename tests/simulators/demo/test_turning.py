@@ -7,7 +7,7 @@ import pytest
 from app.simulators.demo import plant, turning
 from app.simulators.demo.installing import set_up
 from inband_client import Client
-from tests.conftest import Server
+from tests.servers import Server
 
 
 def test_a_month_of_runs_is_there_once(server: Server, monkeypatch: pytest.MonkeyPatch) -> None:

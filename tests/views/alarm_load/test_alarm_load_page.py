@@ -7,8 +7,8 @@ from sqlalchemy import text
 
 from app.loop.alarms.kinds import kinds
 from app.views.alarm_load.wording import made_by
-from tests.conftest import Server
 from tests.quality.closed_loop import cut, scatter
+from tests.servers import Server
 from tests.shop import Person, Shop
 
 BEGIN = datetime(2026, 2, 3, 6, tzinfo=UTC)

@@ -14,8 +14,8 @@ from app.views.help.contents import groups
 from app.views.help.queries import document, documents, files, sections
 from app.web.help_ways import help_of
 from app.web.terms import PAGE, term_of, terms
-from tests.conftest import Server
 from tests.pages.house import PAGES
+from tests.servers import Server
 from tests.shop import Person, Shop
 
 INDICES = ("Cp", "Cpk", "Pp", "Ppk", "Cpm", "Pm", "Pmk", "ppm", "Cg", "Cgk", "%GRR", "GRR of the variation", "ndc")

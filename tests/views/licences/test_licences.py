@@ -12,7 +12,7 @@ from packaging.requirements import Requirement
 from app import HOUSE
 from app.views.licences.libraries import libraries, plain
 from app.views.licences.sbom import bill
-from tests.conftest import Server
+from tests.servers import Server
 from tests.shop import Person
 
 

@@ -9,8 +9,8 @@ from sqlalchemy import event, text
 
 from app.core.state import CharacteristicState
 from app.views.characteristic import state_queries as queries
-from tests.conftest import RunServer, Server
 from tests.pages.looks import live
+from tests.servers import RunServer, Server
 from tests.shop import PARAMETERS, Person, Shop
 from tests.waits import until
 

@@ -2,7 +2,7 @@
 
 import pytest
 
-from tests.conftest import Server
+from tests.servers import Server
 from tests.shop import Shop
 from tests.views.reports.story import told
 

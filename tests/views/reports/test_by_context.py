@@ -10,8 +10,8 @@ from zipfile import ZipFile
 import pytest
 from pypdf import PdfReader
 
-from tests.conftest import Server
 from tests.forked import inband
+from tests.servers import Server
 from tests.shop import Person, Shop
 from tests.views.reports.story import facts, file, report, scatter, table
 from tests.waits import until

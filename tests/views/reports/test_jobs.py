@@ -24,7 +24,7 @@ from app.views.reports import actions
 from app.views.reports.bundle import Bundle
 from app.views.reports.request import ReportRequest, SectionName
 from app.views.reports.tables import ReportJob
-from tests.conftest import RunServer, Server
+from tests.servers import RunServer, Server
 from tests.shop import Person, Shop
 from tests.views.reports.story import scatter
 from tests.waits import until

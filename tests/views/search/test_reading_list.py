@@ -5,7 +5,7 @@ from typing import Any
 
 import pytest
 
-from tests.conftest import Server
+from tests.servers import Server
 from tests.shop import Shop
 
 pytestmark = pytest.mark.own_server

@@ -11,7 +11,7 @@ from app.bridge.kinds import KINDS, kind_named
 from app.loop.characteristics import actions as characteristics
 from app.loop.characteristics.schemas import CharacteristicIn
 from app.views.set_up.machine_pages import stopping
-from tests.conftest import Server
+from tests.servers import Server
 from tests.shop import ACTOR, PARAMETERS, Person, Shop, unique
 
 SERBIAN = "Седиште „лежаја” Ø40 <b>h6</b> & 'A'"

@@ -8,7 +8,7 @@ from sqlalchemy import text
 
 from app.language.times import begin_of_shift, begins_of_shifts, end_of_shift, keep_time_of, plant_time
 from app.settings import Settings
-from tests.conftest import Server
+from tests.servers import Server
 from tests.shop import Person, Shop
 
 LONG_AGO = "2026-03-05T07:{:02}:00Z"

@@ -12,9 +12,9 @@ from sqlalchemy import select
 from app.access import devices
 from app.access.identification import FREE
 from app.access.tables import Person as PersonOnRecord
-from tests.conftest import TLS, Server
 from tests.pages.looks import live
 from tests.pictures import picture
+from tests.servers import TLS, Server
 from tests.shop import PASSWORD, Person, Shop
 
 PIN, BADGE = "2746", "0004711882"

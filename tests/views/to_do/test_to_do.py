@@ -6,7 +6,7 @@ from typing import Any
 import pytest
 from playwright.sync_api import Page, expect
 
-from tests.conftest import Server
+from tests.servers import Server
 from tests.shop import Person, Shop
 
 pytestmark = pytest.mark.own_server

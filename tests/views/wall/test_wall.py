@@ -17,7 +17,7 @@ from app.loop.maintenance.tables import Maintenance
 from app.loop.tables.alarms import Alarm
 from app.views.wall import queries
 from app.views.wall.pages import MOST, WITHIN, Rate
-from tests.conftest import Server
+from tests.servers import Server
 from tests.shop import Person, Shop, unique
 
 SHARES = 6

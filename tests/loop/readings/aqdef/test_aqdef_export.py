@@ -14,9 +14,9 @@ from app.files.aqdef.values import OF_FIELD as F
 from app.files.aqdef.values import Measured, Value
 from app.loop.readings import queries
 from app.loop.readings.actions import exclude
-from tests.conftest import Server
 from tests.forked import inband
 from tests.loop.readings.importing.test_history import run, scalar, set_up, table
+from tests.servers import Server
 from tests.shop import Shop
 
 

@@ -10,7 +10,7 @@ from app.loop.readings.aqdef import actions as aqdef_actions
 from app.loop.readings.aqdef import content as aqdef_content
 from app.loop.readings.importing import lines as importing
 from app.loop.readings.importing import uploads
-from tests.conftest import NewDatabase, drop_database
+from tests.databases import NewDatabase, drop_database
 from tests.in_process import in_process
 from tests.loop.readings.importing.doors import ZONE, Plant
 

@@ -12,7 +12,7 @@ from playwright.sync_api import Page, expect
 from sqlalchemy import text
 
 from app.files.formats.delimited import encoding_of, samples
-from tests.conftest import Server
+from tests.servers import Server
 from tests.shop import Person, Shop
 
 

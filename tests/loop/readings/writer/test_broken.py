@@ -17,10 +17,11 @@ import pytest
 
 from app.core.parameters import read
 from app.db.embedded import EmbeddedServer
-from tests.conftest import RunServer, Server, copied
+from tests.databases import copied
 from tests.db.clusters import commits_wait_for
 from tests.loop.readings.load import Sender, all_at_once, scattered
 from tests.loop.readings.record import history, must_be_stored, must_hold, must_replay, rows
+from tests.servers import RunServer, Server
 from tests.shop import PARAMETERS, Shop
 
 pytestmark = pytest.mark.own_server  # it is stopped, and its database made to fail

@@ -15,9 +15,9 @@ from app.loop.readings.writer import transaction
 from app.loop.readings.writer.batch import store_batch
 from app.loop.readings.writer.columnar import ColumnarReadings
 from app.loop.readings.writer.transaction import new_verdicts
-from tests.conftest import Server
 from tests.loop.readings.record import must_hold, rows
 from tests.loops import in_thread
+from tests.servers import Server
 from tests.shop import Shop
 
 pytestmark = pytest.mark.own_server  # the whole record of its database is held against the rules

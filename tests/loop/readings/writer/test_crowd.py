@@ -17,10 +17,10 @@ import pytest
 
 from app.core.parameters import Parameters, read
 from app.loop.readings.writer.connection import GIVE_WAY
-from tests.conftest import TLS, RunServer, Server
 from tests.loop.readings.load import Sender, all_at_once, scattered
 from tests.loop.readings.record import history, must_be_stored, must_hold, must_replay
 from tests.loops import run
+from tests.servers import TLS, RunServer, Server
 from tests.shop import PARAMETERS, Shop
 
 pytestmark = pytest.mark.own_server  # every machine's lock is held, and its threads are watched

@@ -16,8 +16,8 @@ from app.loop.readings.writer.connection import connect
 from app.loop.readings.writer.load import load
 from app.loop.readings.writer.snapshot import Snapshot
 from app.loop.readings.writer.transaction import ROLLBACK, transact
-from tests.conftest import Server
 from tests.loop.readings.record import history, must_hold
+from tests.servers import Server
 from tests.shop import Shop
 
 pytestmark = pytest.mark.own_server  # the whole record of its database is held against the rules

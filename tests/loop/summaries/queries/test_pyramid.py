@@ -24,7 +24,7 @@ from app.loop.summaries.queries.window import Window
 from app.views.characteristic.figures import counting_edges, histogram_counts
 from bench.plant import PARAMETERS
 from bench.readings import fill
-from tests.conftest import Server
+from tests.servers import Server
 from tests.shop import Shop
 
 pytestmark = pytest.mark.own_server  # very many readings that no machine has sent

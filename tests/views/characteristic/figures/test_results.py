@@ -18,8 +18,8 @@ from app.views.characteristic.figures import (
     touches_picture,
     zone_chart,
 )
-from tests.conftest import Server
 from tests.pages.looks import boxes
+from tests.servers import Server
 from tests.shop import Person, Shop
 
 pytestmark = pytest.mark.own_server  # results without readings, by the hundred thousand
