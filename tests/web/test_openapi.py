@@ -34,7 +34,8 @@ def app() -> FastAPI:
 
 
 @pytest.fixture(scope="module")
-def made() -> Json:
+def made(app: FastAPI) -> Json:
+    """Of the program that is loaded here: its models are looked at, too."""
     return document()
 
 
