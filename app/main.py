@@ -237,7 +237,7 @@ def _pools(settings: Settings, connections: Connections, waits: Histogram) -> tu
     """The database of pages and programs, of machines at their doors, and of what works in the background.
 
     Requests that work for seconds may hold every connection of the first. Of the other two there are as many connections as
-    threads that ask: where the database is unreachable, nobody waits half a minute for a connection of somebody else.
+    threads that ask: where the database is unreachable, nobody waits half a minute for a connection of another caller.
     """
     url = settings.database_url or ""
 

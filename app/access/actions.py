@@ -50,7 +50,7 @@ class SessionEnded(NotSignedIn):
 
 
 def add_person(session: Session, *, name: str, role: str, password: str, actor: str) -> Person:
-    """Add somebody who may sign in.
+    """Add a person who may sign in.
 
     Raises `Invalid` for a name or password that cannot be used, `Conflict` for a name that is taken or looks like one that is.
     """
@@ -60,7 +60,7 @@ def add_person(session: Session, *, name: str, role: str, password: str, actor: 
 
 
 def add_person_of_another_plant(session: Session, person: Person, role: str, actor: str) -> Person:
-    """Add somebody who may sign in to another plant already, with the same name and password.
+    """Add a person who may sign in to another plant already, with the same name and password.
 
     Raises `Invalid` for an unknown role, `Conflict` for a name that is taken or looks like one that is.
     """
@@ -105,7 +105,7 @@ def withdraw_invitation(session: Session, token_hash: bytes, actor: str) -> None
 
 
 def accept_invitation(session: Session, token: str, name: str, password: str) -> Person:
-    """Somebody opened their link and chose a name and a password.
+    """A person opened their link and chose a name and a password.
 
     Raises `NotFound` for a link that was used or has expired; what `add_person` raises leaves the link usable.
     """
@@ -123,7 +123,7 @@ def accept_invitation(session: Session, token: str, name: str, password: str) ->
 
 
 def change_password(session: Session, caller: Caller, old: str, new: str, keep_token: str | None) -> bool:
-    """Somebody changes their own password; their other browsers are signed out, and their PIN ends.
+    """A person changes their own password; their other browsers are signed out, and their PIN ends.
 
     Returns if there was a PIN. Badges stay: `app.access.identification.remove_badges`. Raises `Invalid` when the old password is wrong or the new one cannot be used. Who was wrong `GUESSES` times has lost
     the session: `SessionEnded`, which must not take the transaction back.
@@ -150,7 +150,7 @@ def _end_pin(session: Session, person: Person, actor: str) -> bool:
 
 
 def check_password(session: Session, caller: Caller, password: str, token: str | None, field: str) -> Person:
-    """Somebody says their present password once more, before something that their session alone must not do.
+    """A person says their present password once more, before something that their session alone must not do.
 
     Raises `Invalid` when it is wrong; `SessionEnded` when it was wrong `GUESSES` times.
     """
@@ -198,7 +198,7 @@ class NewPassword(NamedTuple):
 
 
 def reset_password(session: Session, person_id: int, actor: str) -> NewPassword:
-    """Give somebody who has forgotten theirs a new password, shown this once; sign them out everywhere and end their PIN."""
+    """Give a person who has forgotten theirs a new password, shown this once; sign them out everywhere and end their PIN."""
     person = _person(session, person_id)
     password = "-".join(secrets.token_hex(2) for _part in range(4))
     person.password_hash = hashed(password)
@@ -209,7 +209,7 @@ def reset_password(session: Session, person_id: int, actor: str) -> NewPassword:
 
 
 def change_role(session: Session, person_id: int, role: str, actor: str) -> Person:
-    """Give somebody another role, from now on. Raises `Conflict` when nobody would be left to administer."""
+    """Give a person another role, from now on. Raises `Conflict` when nobody would be left to administer."""
     _role(role)
     _lock_admins(session)
     person = _person(session, person_id)
@@ -225,7 +225,7 @@ def change_role(session: Session, person_id: int, role: str, actor: str) -> Pers
 
 
 def disable_person(session: Session, person_id: int, actor: str) -> Person:
-    """End somebody's access, at once and in every browser. Raises `Conflict` for the last administrator."""
+    """End a person's access, at once and in every browser. Raises `Conflict` for the last administrator."""
     _lock_admins(session)
     person = _person(session, person_id)
     if person.disabled_at is not None:
@@ -240,7 +240,7 @@ def disable_person(session: Session, person_id: int, actor: str) -> Person:
 
 
 def enable_person(session: Session, person_id: int, actor: str) -> Person:
-    """Let somebody in again, with the role they had."""
+    """Let a person in again, with the role they had."""
     person = _person(session, person_id)
     if person.disabled_at is not None:
         person.disabled_at = None

@@ -51,7 +51,7 @@ class Caller:
         )
 
     def must_at(self, machine_id: int, role: Role) -> None:
-        """Raises `NotAllowed` unless this is that machine's own key, or somebody with the role.
+        """Raises `NotAllowed` unless this is that machine's own key, or a person with the role.
 
         For what a machine does itself: what it measures, applies and reports, and looking at its own set-up.
         """

@@ -149,7 +149,7 @@ def _until(now: datetime, left: int) -> str:
 
 
 def set_pin(session: Session, caller: Caller, password: str, pin: str, keep_token: str | None) -> None:
-    """Somebody sets their own PIN; an empty one is none any more.
+    """A person sets their own PIN; an empty one is none any more.
 
     Raises `Invalid` when the password is wrong or the PIN cannot be used; `SessionEnded` as `change_password` does.
     """

@@ -17,7 +17,7 @@ PUNCTUATION = " .,'’ʼ-‐·_@+&"
 ALIKE = {"LATIN", "CYRILLIC", "GREEK", "COPTIC", "ARMENIAN", "CHEROKEE", "LISU"}
 """Scripts with letters that are taken for those of another one."""
 RESERVED = ("inband", "key", "commandline", "command", "sign-in", "system")
-"""First words under which the record knows somebody else than a person."""
+"""First words under which the record knows an actor that is not a person."""
 # Not seen, although they are letters or marks to Unicode: fillers, joiners, selectors of variants.
 _UNSEEN = {
     0x034F,

@@ -1,6 +1,6 @@
 """Signing in and out of a browser, and slowing down who guesses.
 
-Strangers who guess keep nobody out: from a place where somebody has signed in before (a browser by its cookie, an address)
+Strangers who guess keep nobody out: from a place where a person has signed in before (a browser by its cookie, an address)
 only the failures with that name from that place count. All other places share what is left to guessing.
 """
 
@@ -85,7 +85,7 @@ def sign_in(database: Database, name: str, password: str, address: str, hours: i
 
 
 def knows(database: Database, name: str) -> bool:
-    """Tell if somebody of this name, as typed, may be known here: for a sign-in to several plants."""
+    """Tell if a person of this name, as typed, may be known here: for a sign-in to several plants."""
     with database.begin() as session:
         return _person(session, _typed(name)) is not None
 
@@ -113,7 +113,7 @@ def _place(address: str) -> str:
 
 
 def begin_session(session: Session, person_id: int, hours: int) -> SignedIn:
-    """A session for somebody who has just shown who they are."""
+    """A session for a person who has just shown who they are."""
     session.execute(delete(BrowserSession).where(BrowserSession.expires_at < func.now()))
     token, expires_at = secrets.token_urlsafe(32), datetime.now(UTC) + timedelta(hours=hours)
     session.add(

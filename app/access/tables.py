@@ -12,7 +12,7 @@ _ROLE_CHECK = "role IN ('viewer', 'operator', 'engineer', 'admin')"
 
 
 class Person(Base):
-    """Somebody who signs in. Disabled people stay, because the record names them."""
+    """A person who signs in. Disabled people stay, because the record names them."""
 
     __tablename__ = "person"
     __table_args__ = (
@@ -44,7 +44,7 @@ class BrowserSession(Base):
 
 
 class Invitation(Base):
-    """A one-time link with which somebody chooses a name and a password."""
+    """A one-time link with which a person chooses a name and a password."""
 
     __tablename__ = "invitation"
     __table_args__ = (CheckConstraint(_ROLE_CHECK, name="role"),)
@@ -69,7 +69,7 @@ class LoginFailure(Base):
 
 
 class KnownPlace(Base):
-    """A place that somebody has signed in from: an address, or a browser by its cookie (`device ` and the SHA-256 of its token).
+    """A place that a person has signed in from: an address, or a browser by its cookie (`device ` and the SHA-256 of its token).
 
     From there strangers who guess the password elsewhere keep nobody out.
     """

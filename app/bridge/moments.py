@@ -15,7 +15,7 @@ GAINED_UNKNOWN = 7200.0  # s: a clock that is not known may never have been set 
 TOGETHER = 10.0  # s between lines that a program prints at once
 DRIFT = 30.0  # s
 HELD_UP = 1800.0  # s that a line may lie in a network that was cut; more is a clock that was set
-FRESH = 2.0  # polls: when the last one was longer ago, nobody knows what came meanwhile
+FRESH = 2.0  # polls: when the last one was longer ago, it is not known what came meanwhile
 START = 5.0  # s: what comes so soon after a connection may have waited in a buffer
 
 

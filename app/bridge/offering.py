@@ -24,7 +24,7 @@ NOTICED = 0.0005  # mm: what an offset may differ by without being reported
 
 
 async def tell(unit: Unit, client: AsyncClient) -> None:
-    """The control's answers, and offsets that somebody has changed at the control. One that is refused holds up no other."""
+    """The control's answers, and offsets that a person has changed at the control. One that is refused holds up no other."""
     key = unit.machine.key
     refused: ProblemError | None = None
     for intent in await unit.store.intents(key, "answered"):
@@ -220,7 +220,7 @@ async def _tell_again(unit: Unit, client: AsyncClient, correction: Correction, e
 async def _reject(unit: Unit, client: AsyncClient, number: int, reason: str) -> None:
     try:
         await client.reject(unit.machine.key, number, reason)
-    except Conflict as error:  # somebody was quicker; what was offered before must not stay on offer for that
+    except Conflict as error:  # someone else was quicker; what was offered before must not stay on offer for that
         log.info("%s: correction %d: %s", unit.machine.key, number, error)
 
 

@@ -1,7 +1,7 @@
 """The change of an offset by a touch test: noted in the store before the control hears of it, and taken back whatever happens.
 
 One rule for the command and for the page: an offset is written only where the control holds the one that was read, and taken
-back only where it holds the one that was written. Anything else is somebody's, and is left alone and said.
+back only where it holds the one that was written. Anything else was set by someone else: it is left alone and reported.
 """
 
 import asyncio

@@ -146,7 +146,7 @@ class RegisterLink:
         now = datetime.now().astimezone()
         known = stored.epoch is not None
         block = self._block = await self._read(stored.sequence if known else None)
-        if not known:  # the first contact: what is acknowledged was fetched by somebody before
+        if not known:  # the first contact: what is acknowledged was fetched by someone before
             first = max(min(block.ack, block.written), block.written - SLOTS)
             stored = Position(block.epoch, first, stored.generation)
         if reason := went_back(block, stored.sequence, stored.epoch):
@@ -479,7 +479,7 @@ class RegisterLink:
     async def _write_all(self, content: Sequence[tuple[Register, float]]) -> None:
         """Write registers of the block in this order, and read them back.
 
-        Twice where they are read one by one: such a control may hand us an answer that was meant for somebody else.
+        Twice where they are read one by one: such a control may hand us an answer that was meant for someone else.
         """
         for place, value in content:
             await self.registers.write(place, float(value))

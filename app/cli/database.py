@@ -53,7 +53,7 @@ def migrate(
     from app.db import migrate as migrations
 
     settings = settings_from(data_dir=data_dir, database_url=database_url)
-    refuse_nothing_there(settings)  # an empty database of a server of one's own is migrated: somebody made it
+    refuse_nothing_there(settings)  # an empty database of a server of one's own is migrated: it was made for that
     with reachable(settings) as url:
         if back_to is not None:
             _go_back(url, back_to, sure=yes)

@@ -39,7 +39,7 @@ MOST_AHEAD = 40.0  # times as far along the line as a part is ahead, `cone` look
 
 
 class Forecast(NamedTuple):
-    """Parts until the wear reaches a limit, with its 95 % interval; 0 = reached. high is inf where nobody can say."""
+    """Parts until the wear reaches a limit, with its 95 % interval; 0 = reached. high is inf where it cannot be determined."""
 
     parts: float
     low: float

@@ -197,7 +197,7 @@ class Route:
 
 @dataclass(frozen=True, slots=True)
 class Receiver:
-    """Somebody, or something, that is notified. quiet: when not; away_until: not before; last_at: its last message.
+    """A person, or something, that is notified. quiet: when not; away_until: not before; last_at: its last message.
 
     failing: it could not be reached the last time. busy: it must not be tried now, for it is being tried or pauses. spare: its
     last message is known to have had no alarm that stops a machine.

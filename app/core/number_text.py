@@ -1,7 +1,7 @@
 """Numbers as people type, paste and print them, read the same way at every door.
 
 The minus may be any sign that texts are printed with, and the decimal sign a point or a comma. A blank inside a number,
-behind its sign too, makes it no number: of a scanned ``0. 001`` or ``- 0.016`` nobody knows what stood there, and ``40 001`` was
+behind its sign too, makes it no number: of a scanned ``0. 001`` or ``- 0.016`` it is not known what was there, and ``40 001`` was
 40.001 as likely as forty thousand.
 Separators of thousands are refused for the same reason, and named. Nothing is guessed.
 """

@@ -8,7 +8,7 @@ in each group (Frisch and Waugh 1933, Econometrica 1, 387), so that steps betwee
 *Collinearity.* The variance inflation of a column is 1 / (1 - R²) with R² from regressing it on the others (Marquardt 1970,
 Technometrics 12, 591): by so much its standard error, squared, is larger than if it were alone. Beyond `INFLATED` its effect
 is hard to tell from the others'. A column that does not vary, or that others determine, has no effect of its own, nor have
-those that determine it: the plane is fitted all the same, but nobody can say which of them it is. They are named in `left_out`.
+those that determine it: the plane is fitted all the same, but it cannot be determined which of them it is. They are named in `left_out`.
 
 *Scatter of neighbours that is alike.* Readings of a process drift together, so an interval from the standard error of
 independent ones is too narrow. As in `app.core.wear`, n readings count as n (1 - rho) / (1 + rho) (Santer et al. 2000). The

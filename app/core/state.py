@@ -59,7 +59,7 @@ CALM = frozenset(
 class Known:
     """Facts that the state is derived from.
 
-    paused: by a probe fault; tool_paused: nobody knows which offset its tool has.
+    paused: by a probe fault; tool_paused: it is not known which offset its tool has.
     alarms: kinds of the active ones. corrections: statuses of the open ones. trend: the last deviations, oldest first, mm;
     since: when the first of them arrived. excluded: the last reading was taken out of the statistics.
     """

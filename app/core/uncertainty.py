@@ -37,7 +37,7 @@ def zero_range_floor(
 ) -> float:
     """The smallest sensible R33 as far as the signal path goes, mm: the part of the position error that varies.
 
-    A direct path has none. jitter: how much the delay varies, ms; where nobody has measured it the whole delay counts,
+    A direct path has none. jitter: how much the delay varies, ms; where it is not measured the whole delay counts,
     because a signal that waits for the PLC's scan may wait for all of it or not at all.
 
     >>> zero_range_floor(SignalPath.PLC), zero_range_floor(SignalPath.PLC, jitter=0.1), zero_range_floor(SignalPath.DIRECT)

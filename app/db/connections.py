@@ -29,9 +29,9 @@ from psycopg.errors import OperationalError
 LIMITS = "-c timezone=UTC -c lock_timeout=10s -c statement_timeout=60s -c idle_in_transaction_session_timeout=60s"
 """A query that hangs must not hold a machine's lock for ever. Work that needs longer says ``SET LOCAL``."""
 PATIENCE = 5.0
-"""Seconds that somebody waits for a database that does not answer, where no setting says otherwise."""
+"""Seconds that a caller waits for a database that does not answer, where no setting says otherwise."""
 LOOK = 0.1
-"""Seconds between two looks of somebody who waits, at whether the database is still heard."""
+"""Seconds between two looks of a caller who waits, at whether the database is still heard."""
 TRIFLE = "SELECT pg_postmaster_start_time()"
 """Needs no table, no lock and no disk, and tells a server from the one that has replaced it."""
 

@@ -5,7 +5,7 @@ of its own (it changes permissions of home folders and ends processes), is never
 
 In the data directory::
 
-    postgres/      the cluster        start.lock    held while somebody starts or stops the server
+    postgres/      the cluster        start.lock    held while the server is started or stopped
     postgres.log   what it says       users.lock    held (shared) by everyone who uses the server
     run/           its socket
 
@@ -377,7 +377,7 @@ class EmbeddedServer:
                 _signal(process, signal.SIGCONT)
             deadline = time.monotonic() + patience
             while _is_postgres(pid, self.cluster) and time.monotonic() < deadline:
-                with contextlib.suppress(ChildProcessError):  # started by somebody else
+                with contextlib.suppress(ChildProcessError):  # started by someone else
                     os.waitpid(pid, os.WNOHANG)
                 time.sleep(0.02)
             if not _is_postgres(pid, self.cluster):
@@ -425,7 +425,7 @@ def clusters_in_use() -> set[Path]:
 def make_data_dir(path: Path) -> None:
     """Make the data folder, closed for everybody else. Raises `EmbeddedServerError`.
 
-    Root's server runs as somebody else, who must pass through; nothing in it is open to him but what is his.
+    Root's server runs as someone else, who must pass through; nothing in it is open to him but what is his.
     """
     _make_private(path, 0o711 if is_root() else 0o700)
 

@@ -70,7 +70,7 @@ class Database:
         """pool_size: connections kept open. overflow: how many more there may be at once; as many again if left out, -1: any.
 
         connections: those of the process, if they are watched; else some of its own, which are not. copy_of: where what is read
-        here is written. waited: gets the seconds after which somebody had a connection, or had none.
+        here is written. waited: gets the seconds after which a caller had a connection, or had none.
         """
         self.dsn = plain_url(url)
         """For psycopg itself and PostgreSQL's programs. Holds the password; not for logs."""

@@ -26,7 +26,7 @@ def open_lock(path: Path) -> int:
             f"{path.parent} cannot be written ({error.strerror}). Run Inband as the user the folder belongs to, "
             "or choose another with --data-dir."
         ) from None
-    if is_root():  # sudo in somebody's folder must not lock them out
+    if is_root():  # sudo in a user's folder must not lock them out
         owner = path.parent.stat()
         os.fchown(lock, owner.st_uid, owner.st_gid)
     return lock

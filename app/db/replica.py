@@ -1,6 +1,6 @@
 """A copy of the database that heavy reading is done on, so that it does not disturb the server that is written to.
 
-Nothing is written on it. It lags behind, so how far it has got is looked at each second, and what somebody must see – their
+Nothing is written on it. It lags behind, so how far it has got is looked at each second, and what a person must see – their
 own change, the event that made a page look again – is asked of it before it is read. Where it has not got that, is unreachable, or
 lags too far, the server that is written to is read.
 """
@@ -28,7 +28,7 @@ EVERY = 1.0
 WAIT = 0.2
 """Seconds that one who must see something waits for it here, before the other server is read."""
 REST = 5.0
-"""Seconds in which it is not read after it has failed somebody."""
+"""Seconds in which it is not read after it has failed a query."""
 
 _WRITTEN = text("SELECT (pg_current_wal_flush_lsn() - '0/0')::bigint")
 # A server that has been promoted meanwhile has everything that is written to it.

@@ -1,4 +1,4 @@
-"""Running a program as somebody else than root, for programs that refuse to be root. Linux only; others need nothing of it."""
+"""Running a program as someone else than root, for programs that refuse to be root. Linux only; others need nothing of it."""
 
 import contextlib
 import os
@@ -15,7 +15,7 @@ CAP_DAC_OVERRIDE, CAP_DAC_READ_SEARCH, CAP_SETPCAP = 1, 2, 8  # bit numbers, cap
 
 
 class RunAsError(Exception):
-    """It cannot be run as somebody else; the message says why and what to do."""
+    """It cannot be run as someone else; the message says why and what to do."""
 
 
 def is_root() -> bool:

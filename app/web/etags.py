@@ -1,4 +1,4 @@
-"""ETag and If-Match: an edit that names the state it was made from is refused where somebody else has changed that since.
+"""ETag and If-Match: an edit that names the state it was made from is refused where someone else has changed that since.
 
     @router.get("/machines/{machine}", responses=problems(404) | TAGGED)
     @tagged

@@ -75,7 +75,7 @@ def one_line(text: str) -> str:
 
 
 def _written(value: Any) -> Any:
-    """A count of (milli)seconds is not a time here, not even as text: nobody can tell which of them it is."""
+    """A count of (milli)seconds is not a time here, not even as text: it cannot be determined which of them it is."""
     if isinstance(value, datetime) or (isinstance(value, str) and "-" in value[1:]):
         return value
     raise PydanticCustomError("datetime_type", "not a time")

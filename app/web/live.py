@@ -42,7 +42,7 @@ class Message(NamedTuple):
 
 
 class Access(NamedTuple):
-    """By what somebody listens: the SHA-256 of a browser's session, or the number of a key; and the role it gave then."""
+    """By what a client listens: the SHA-256 of a browser's session, or the number of a key; and the role it gave then."""
 
     session: bytes | None
     key: int | None
@@ -103,7 +103,7 @@ class Live:
                         if self._clients:
                             async with asyncio.timeout(HEARTBEAT):
                                 await self._end_those_without_access(conn)
-            except TimeoutError:  # nobody can say who may still listen
+            except TimeoutError:  # it cannot be determined who may still listen
                 self._let_go()
             except psycopg.Error as error:
                 log.debug("access to live events cannot be checked: %s", error)

@@ -18,7 +18,7 @@ log = logging.getLogger(__name__)
 
 HEADER = b"x-request-id"
 LONGEST_REASON = 300  # characters
-STREAMS = frozenset({"/api/v1/events"})  # they last as long as somebody listens
+STREAMS = frozenset({"/api/v1/events"})  # they last as long as a client listens
 _SANE = re.compile(rb"[A-Za-z0-9._-]{1,64}")
 
 

@@ -2,7 +2,7 @@
 
 A room declares its verbs. Each is drawn as a page that asks and does (`add_question_page`), as a dialog and at a station
 (`Verb.question`, `carry_out`) and as a JSON route (`add_json_route`); the button, the sentence afterwards and the form follow from the
-declaration. The role it needs, the savepoint, "somebody was first" and "sent twice" are here and nowhere else.
+declaration. The role it needs, the savepoint, "someone else was first" and "sent twice" are here and nowhere else.
 """
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
@@ -74,7 +74,7 @@ class Said(NamedTuple):
 
 
 class Outcome(NamedTuple):
-    """The end of an act: done; late, somebody else was first; ask, the question is another one now.
+    """The end of an act: done; late, someone else was first; ask, the question is another one now.
 
     result: what the act returned; refused: why it is late, in words.
     """

@@ -26,7 +26,7 @@ def record(
     *,
     by: Acting | None = None,
 ) -> None:
-    """Note that somebody changed something, in the transaction that changes it.
+    """Record a change, in the transaction that makes it.
 
     ``action`` is a short verb phrase (`characteristic changed`), ``subject`` names what was changed as `kind/key`
     (`characteristic/shaft-d40`, `tool/lathe-1/3`). Secrets and passwords are never part of before and after. ``by``: whose

@@ -37,7 +37,7 @@ def write(
     *,
     by: Acting | None = None,
 ) -> None:
-    """Note that somebody changed something; see `app.access.audit.actions.record`, which takes a session."""
+    """Record a change; see `app.access.audit.actions.record`, which takes a session."""
     by = by or acting.get()
     values = [None if side is None else Jsonb(side) for side in (before, after)]
     connection.execute(_INSERT, [actor, by.person_id, by.key_id, action, subject, *values, why or None, by.device_id])

@@ -145,7 +145,7 @@ class Folder(OneWay):
         return self.settings.decisions is not None
 
     async def decide(self, decided: Sequence[Decided]) -> None:
-        """Write the file that says `stop` or `hold`, as a whole; a stop that nobody has removed stays."""
+        """Write the file that says `stop` or `hold`, as a whole; a stop that is not removed stays."""
         stopping = [each for each in decided if each.action in STOPPING]
         if stopping and self.settings.decisions is not None:
             worst = max(reversed(stopping), key=lambda each: each.action == "stop")

@@ -60,7 +60,7 @@ class Settings(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
 
 
 class Mixed(Exception):
-    """Somebody else's answer came among ours."""
+    """Someone else's answer came among ours."""
 
 
 class Lines(asyncio.Protocol):
@@ -252,7 +252,7 @@ class HaasRegisters:
             await self._fence()
         self._fenced = False
         if any(SERIAL.match(line) for line in self._lines.taken()):
-            raise Mixed  # one of the two was for somebody else
+            raise Mixed  # one of the two was for someone else
         marker = self._variable(Register.EPOCH)
         before = [marker] if math.isnan(self._marker) else []
         behind = [] if numbers[-1] == marker else [marker]

@@ -9,7 +9,7 @@ ProblemError            the server will not do it, or its answer cannot be read
 ├── Invalid        422  the payload; `errors` names each field
 ├── Untrusted           the server's certificate is not trusted
 └── Unavailable         no answer as long as the client was patient, or none that may be asked for twice
-Stopped                 somebody called `stop()`
+Stopped                 `stop()` was called
 """
 
 from collections.abc import Mapping, Sequence

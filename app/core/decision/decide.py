@@ -66,7 +66,7 @@ class LoopState(NamedTuple):
 
     average: M, the running average of this characteristic's memory location R11, mm.
     total: sum of the corrections of the tool since it was changed, issued ones included, in offset units (mm).
-    paused: compensation is paused by an alarm that nobody has acknowledged yet: a probe fault, or an offset that differs.
+    paused: compensation is paused by an alarm that is not acknowledged yet: a probe fault, or an offset that differs.
     """
 
     average: float = 0.0
@@ -127,7 +127,7 @@ def decide(
         nothing unless the characteristic allows it.
     jump: neither wear nor scatter explains it (`plausibility.is_jump`): what it asks for is computed in full and held, and
         it says nothing to the average. In the wear zone the alarm *tool worn* asks the same already.
-    by_hand: the size is that of the tool itself, and somebody has set its offset since it was changed: nobody knows how much
+    by_hand: the size is that of the tool itself, and a person has set its offset since it was changed: it is not known how much
         of it that offset has in it already, so nothing is corrected until the tool is changed.
     not_taken: the machine does not take the corrections of this tool, so what is counted in is not in the offset.
     fault: why the reading cannot be believed whatever D is: the probe triggered on its way to the surface (domain §5, *not a
@@ -188,7 +188,7 @@ def voids_corrections(old: Parameters, new: Parameters) -> bool:
     """Tell if corrections that were computed under the old parameters, and are not in the offset yet, must stay out of it.
 
     They lead to another target, move another tool or the other way; or nothing is to be corrected any more, or only what
-    somebody has approved.
+    a person has approved.
     """
     return (
         nanometres(old.target) != nanometres(new.target)

@@ -16,7 +16,7 @@ from scipy.special import stdtrit
 from app.core.geometry.points import Floats
 
 ALPHA = 0.01  # how often a set of good touches is suspected of holding a bad one
-MOST = 0.25  # of the touches: where more do not belong, nobody can tell which
+MOST = 0.25  # of the touches: where more do not belong, it cannot be determined which
 LEAST_FREEDOM = 2
 SMALLEST = 1e-6  # mm: nobody suspects a nanometre
 

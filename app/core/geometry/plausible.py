@@ -19,7 +19,7 @@ from app.core.geometry.work_zero import MISFIT, Notice, Zero
 from app.core.plausibility import looks_like_inches
 from app.core.warning import CodedWarning, Value
 
-RESIDUAL = 0.1  # mm; larger is suspicious where nobody has stated the repeatability of the probe
+RESIDUAL = 0.1  # mm; larger is suspicious where the user has not stated the repeatability of the probe
 HOLES_APART = 1.0  # mm by which the distance of two holes may differ from the nominal one
 FEELER = 1.0  # mm; a thicker feeler gauge is unusual
 MOST_EXCHANGED = 40  # touches among which exchanged ones are looked for

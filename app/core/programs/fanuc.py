@@ -51,7 +51,7 @@ CALIBRATING_MACRO, MEASURING_MACRO = 9010, 9011
 SECTIONS = 3
 WEAR_LIMIT, CONFIDENCE_LIMIT = 0.3, 1.0  # mm, the least of the ranges printed for R37 and R36
 FEELER, MOST_FEELER = 2, 1.0  # variable of the printed edge finder's macro, and the mm from which it raises an alarm
-RING_DEVIATION = 0.01  # mm, until somebody says what the ring may deviate
+RING_DEVIATION = 0.01  # mm, until a person says what the ring may deviate
 
 _ENDS = r"(?=\s*(?:$|[A-Z#(%\[]))"
 _VARIABLE = re.compile(r"#\s*(\d{1,5})\s*=\s*", re.IGNORECASE | re.ASCII)

@@ -69,7 +69,7 @@ class ZeroText(NamedTuple):
     y: float | None
     z: float | None
     rotation: float | None = None
-    stop: tuple[str, ...] = ()  # codes of warnings that nobody has acknowledged: the text does not run
+    stop: tuple[str, ...] = ()  # codes of warnings that are not acknowledged: the text does not run
     number: int = 0  # of the work zero: the offset before it is kept under this number; 0: it is not kept
 
     @property
@@ -259,7 +259,7 @@ class FrameText(NamedTuple):
     motion: Floats
     base: tuple[Offset, Mapping[str, float]] | None = None
     table: tuple[str, float] | None = None
-    stop: tuple[str, ...] = ()  # codes of warnings that nobody has acknowledged: the text does not run
+    stop: tuple[str, ...] = ()  # codes of warnings that are not acknowledged: the text does not run
     number: int = 0  # of the alignment: the offset before it is kept under this number; 0: it is not kept
 
     @property

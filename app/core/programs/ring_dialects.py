@@ -79,7 +79,7 @@ class Dialect(ABC):
 
     @abstractmethod
     def missing(self, argument: str) -> str | None:
-        """Condition that the caller has left out an argument; None where nobody can tell."""
+        """Condition that the caller has left out an argument; None where it cannot be determined."""
 
     @abstractmethod
     def filled(self, argument: str) -> str | None: ...

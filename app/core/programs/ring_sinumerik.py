@@ -1,7 +1,7 @@
 """The programs of the ring for Sinumerik 840D sl, 828D and One: a field of user data (GUD), or R parameters.
 
 What rests on Siemens' manuals as they are quoted in public, and is to be tried at the control (docs/how-to/ring-programs.md):
-``STOPRE`` before user data that somebody else writes; ``$P_TOOLEXIST``, ``$P_TOOLND``; ``SETAL`` from 65000 to 65999 stops the
+``STOPRE`` before user data that someone else writes; ``$P_TOOLEXIST``, ``$P_TOOLND``; ``SETAL`` from 65000 to 65999 stops the
 program. A changed wear is taken over where the tool or its edge is selected the next time.
 """
 

@@ -56,7 +56,7 @@ class Flaw(NamedTuple):
 class ResultString(NamedTuple):
     """Values of a string, by the names of the errors; None where nothing can be read.
 
-    Where there are not four numbers nobody can tell which is missing, so none of them is given a name.
+    Where there are not four numbers it cannot be determined which is missing, so none of them is given a name.
     """
 
     values: dict[str, float | None]

@@ -1,6 +1,6 @@
 """Statistical process control: control charts, run rules, capability, gauge studies.
 
-Limits are estimated once, from a baseline that somebody has chosen (`shewhart.individuals_baseline` …), and readings are
+Limits are estimated once, from a baseline that a person has chosen (`shewhart.individuals_baseline` …), and readings are
 judged by them afterwards (`shewhart.chart_of` …): nothing in here estimates a limit from the readings it judges.
 Constants are computed (`constants`), results are frozen and say where they come from, and what cannot be said of too few
 readings is refused with a `Refusal` that says how many are missing.

@@ -43,7 +43,7 @@ ALPHA = 0.01
 SIZE = 5
 """Readings in a subgroup (ISO 22514-2 and its relatives take 5)."""
 FEWEST = 50
-"""Ten subgroups; below it nobody can say whether something moves."""
+"""Ten subgroups; with fewer it cannot be determined whether something moves."""
 ENOUGH = 125
 """Twenty-five subgroups of five are asked for."""
 MOST_SUBGROUPS = 200

@@ -134,7 +134,7 @@ def fit_if_needed(
     """The distribution that fits, or why none does; None where the normal one does. side: of a natural limit, as for `fitted`.
 
     At a natural limit one that fits better than the normal one is taken though the readings look normal: of a few hundred
-    readings nobody can tell, and the normal one knows nothing of the limit.
+    readings it cannot be determined, and the normal one knows nothing of the limit.
     """
     normal = not isinstance(indices, Refused) and Caution.NOT_NORMAL not in indices.cautions
     if isinstance(indices, Refused) or (normal and side == 0):

@@ -1,6 +1,6 @@
 """Shewhart's control charts: individuals and moving range, X-bar with R or s, of subgroups of any sizes.
 
-First a baseline, once, from readings that somebody has chosen; then charts, which judge any readings by it and estimate
+First a baseline, once, from readings that a person has chosen; then charts, which judge any readings by it and estimate
 nothing. Formulas: NIST/SEMATECH e-Handbook 6.3.2; Montgomery, chapter 6.
 
     >>> baseline = individuals_baseline([49.6, 47.6, 49.9, 51.3, 47.8, 51.2, 52.6, 52.4, 53.6, 52.1], minimum=10)

@@ -37,7 +37,7 @@ ROUNDING = 1e-9  # of the largest eigenvalue: no direction in which strata could
 
 
 class NoAnswer(StrEnum):
-    """Reason why nobody can say if strata differ."""
+    """Reason why it cannot be determined whether strata differ."""
 
     ONE = "one"  # stratum
     APART = "apart"  # made one after the other

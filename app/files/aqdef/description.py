@@ -108,7 +108,7 @@ class Source:
 
     description: Path
     values: Path | None = None
-    encoding: str | None = None  # as somebody says; else found out
+    encoding: str | None = None  # as a person says; else found out
 
     @classmethod
     def at(cls, path: Path, encoding: str | None = None) -> "Source":

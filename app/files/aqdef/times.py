@@ -78,7 +78,7 @@ def _zone(offset: str | None) -> timezone | None:
 
 
 def day_order(day_first: bool | None) -> DayOrder | None:
-    """The order that somebody says."""
+    """The order that a person says."""
     return None if day_first is None else "day_first" if day_first else "month_first"
 
 

@@ -72,7 +72,7 @@ class FileTimes(NamedTuple):
         return moment(text, zone, pattern, order=self.order)
 
     def settled(self, at: datetime) -> datetime | None:
-        """The time, as a file writes it; None where it means none. Raises `Unreadable` where nobody can tell."""
+        """The time, as a file writes it; None where it means none. Raises `Unreadable` where it cannot be determined."""
         day = default_of(at)
         if day is not None and not self.dated and day not in self.absent:
             raise Unreadable(

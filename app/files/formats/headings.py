@@ -90,7 +90,7 @@ def is_reading(
 ) -> bool | None:
     """Tell that the line which was found as the heading is a reading, so that the table has none; None where it may be either.
 
-    sizes, times: places of the columns that hold them, where somebody has said so.
+    sizes, times: places of the columns that hold them, where a person has said so.
 
     >>> def first(*lines):
     ...     rows = [Row(at, line.split(";")) for at, line in enumerate(lines, 1)]

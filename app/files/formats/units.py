@@ -298,7 +298,7 @@ def unit_above(titles: Iterable[Sequence[str]]) -> str | None:
     >>> unit_above([["ALL DIMENSIONS IN INCHES"]]), unit_above([["Alle Maße in mm"]]), unit_above([["Report 3 (inch)"]])
     ('inch', 'mm', 'inch')
 
-    Raises `UnknownUnit` where they name another unit than mm and do not say of what, or several: nobody can tell which counts.
+    Raises `UnknownUnit` where they name another unit than mm and do not say of what, or several: it cannot be determined which counts.
 
     >>> unit_above([["Tolerances in µm"]])
     Traceback (most recent call last):

@@ -155,7 +155,7 @@ def program_of(
 ) -> str | None:
     """The text that puts the frame where the part lies; None for another control that has not its work offset.
 
-    stop: codes of warnings that nobody has acknowledged; the text does not run then. restore: the text that sets the work
+    stop: codes of warnings that are not acknowledged; the text does not run then. restore: the text that sets the work
     offset back to what it was before; None where none is kept.
     """
     inputs = alignment.given
@@ -178,7 +178,7 @@ def program_of(
 
 
 def stop_of(session: Session, alignment: Alignment, machine: Machine) -> list[str]:
-    """The codes of the warnings that stop its program text; none once somebody has acknowledged them."""
+    """The codes of the warnings that stop its program text; none once a person has acknowledged them."""
     return unacknowledged(session, machine.id, queries.subject_of(alignment), warnings_of(alignment, machine))
 
 

@@ -42,7 +42,7 @@ def evaluate(body: RunIn, limits: Limits, protocol: Protocol | None = None) -> E
 
 
 def _hold_against(evaluated: Evaluated, limits: Limits) -> None:
-    """maxModification: the largest change that somebody would enter."""
+    """maxModification: the largest change that a person would enter."""
     for unit, limit in (("mm", limits.max_modification), ("°", limits.max_modification_angle)):
         values = {
             name: value

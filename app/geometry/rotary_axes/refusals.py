@@ -31,7 +31,7 @@ def is_in_effect(old: KinematicsBackup, now: KinematicsBackup) -> tuple[str, str
 
 
 def changed_meanwhile(seen: int, now: KinematicsBackup) -> tuple[str, str]:
-    """Somebody else has changed the kinematics since it was looked at."""
+    """Someone else has changed the kinematics since it was looked at."""
     text = _("Version {seen} is not in effect any more: {who} made version {now} on {at}: {reason}")
     return (
         text.format(seen=seen, now=now.version, who=now.actor, at=in_sentence(now.at), reason=now.reason),

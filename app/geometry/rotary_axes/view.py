@@ -54,7 +54,7 @@ def shown_machine(
     form: Mapping[str, str] | None = None,
     error: Invalid | None = None,
 ) -> Response:
-    """The page of a machine. late: somebody else was first; form, error: what was typed, and what is wrong with it."""
+    """The page of a machine. late: someone else was first; form, error: what was typed, and what is wrong with it."""
     machine_shown = machine_named(session, machine)
     row = run_history.machine_row(session, machine_shown)
     reference = row.plan.reference_head or ""
@@ -102,7 +102,7 @@ def shown_machine(
 def shown_run(
     request: Request, session: Session, caller: Caller, number: int, *, message: str | None = None, late: bool = False
 ) -> Response:
-    """The page of a run. late: somebody else was first."""
+    """The page of a run. late: someone else was first."""
     row = queries.run(session, number)
     in_force = queries.in_force(queries.course(session, row.machine.id, row.run.head))
     undoable = row.status == "entered" and bool(in_force) and in_force[-1].run == number

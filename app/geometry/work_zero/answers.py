@@ -124,7 +124,7 @@ def program_of(
 ) -> str | None:
     """The text that sets it on its machine, or on another control; None for a control without such a work offset.
 
-    stop: codes of warnings that nobody has acknowledged; the text does not run then. restore: the text that sets the offset
+    stop: codes of warnings that are not acknowledged; the text does not run then. restore: the text that sets the offset
     back to what it was before.
     """
     offset = offset_of(control or machine.control, zero.work_offset)
@@ -140,7 +140,7 @@ def program_of(
 
 
 def stop_of(session: Session, zero: WorkZero, machine: Machine) -> list[str]:
-    """The codes of the warnings that stop its program text; none once somebody has acknowledged them."""
+    """The codes of the warnings that stop its program text; none once a person has acknowledged them."""
     return unacknowledged(session, machine.id, queries.subject_of(zero), warnings_of(zero, machine))
 
 

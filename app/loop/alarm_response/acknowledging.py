@@ -68,7 +68,7 @@ def acknowledge(
     ``offset`` (mm) is what the new tool starts with (`tool_replaced`), or the one that is true (`offset_set`, where
     ``changed_by`` says who has changed it at the control). ``hand``: what was found by hand, kept beside the reading.
     ``handled``: cause and corrective action of the catalogue.
-    Raises `NotFound`; `Conflict` when somebody was first, saying who; `Invalid` when the action cannot be meant.
+    Raises `NotFound`; `Conflict` when someone else was first, saying who; `Invalid` when the action cannot be meant.
     """
     lock_machines(session, [queries.alarm(session, number).alarm.machine_id])
     row = queries.alarm(session, number)

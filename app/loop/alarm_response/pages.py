@@ -130,7 +130,7 @@ def _alarm(
 
 @router.post("/alarms/{number}/acknowledge")
 def acknowledge(request: Request, session: SessionDep, caller: Operator, number: int, form: FormDep) -> Response:
-    """The second touch. Sent twice, or after somebody else, it changes nothing and says so."""
+    """The second touch. Sent twice, or after someone else, it changes nothing and says so."""
     machine = form.get("machine") or None
     try:
         outcome = verbs.acknowledge(session, number, form, caller)

@@ -162,7 +162,7 @@ def _usual_comments(action: str) -> Sequence[str]:
 
 
 def was_first(alarm: Alarm) -> str:
-    """The conflict when somebody else has already acknowledged the alarm."""
+    """The conflict when someone else has already acknowledged the alarm."""
     return _("{who} acknowledged alarm {number} on {at} already: {action}, “{comment}”.").format(
         who=alarm.acknowledged_by,
         number=alarm.id,

@@ -37,7 +37,7 @@ class Place(NamedTuple):
 class CalibrationRow(NamedTuple):
     """A calibration with what became of it.
 
-    status: `refused`; `unchanged` (nothing was to be changed); `proposed` (somebody may accept it); `accepted`;
+    status: `refused`; `unchanged` (nothing was to be changed); `proposed` (a person may accept it); `accepted`;
     `overtaken` (by a newer calibration, or because the value was changed otherwise).
     """
 

@@ -102,7 +102,7 @@ def change_characteristic(
 ) -> CurrentCharacteristic:
     """Change its name or part, or make a new version of its parameters.
 
-    Raises `NotFound`; `Invalid`, also for a change of parameters without a reason; `Conflict` when somebody else has
+    Raises `NotFound`; `Invalid`, also for a change of parameters without a reason; `Conflict` when someone else has
     changed the parameters since ``parameters_version``.
     """
     current = queries.characteristic_named(session, key)

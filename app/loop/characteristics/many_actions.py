@@ -84,7 +84,7 @@ def _planned(current: CurrentCharacteristic, new: NewValue) -> PlannedChange:
 def change_many(session: Session, versions: Mapping[str, int], new: NewValue, reason: str, actor: str) -> int:
     """Give characteristics (by key, with the version that was looked at) the new value, all of them or none.
 
-    Returns the number that was changed. Raises `NotFound`, `Invalid`, and `Conflict` where somebody has changed the
+    Returns the number that was changed. Raises `NotFound`, `Invalid`, and `Conflict` where a person has changed the
     parameters meanwhile; each names the characteristic.
     """
     if new.name in OF_ONE or new.name not in BY_NAME:

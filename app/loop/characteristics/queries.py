@@ -86,7 +86,7 @@ def hold_characteristic(session: Session, given: Mapping[str, Any]) -> None:
 
 
 def characteristic_for(session: Session, caller: Caller, key: str, role: Role) -> CurrentCharacteristic:
-    """The characteristic with this key, for the key of its machine or somebody with the role.
+    """The characteristic with this key, for the key of its machine or a person with the role.
 
     Raises `NotFound`, `NotAllowed`.
     """

@@ -1,6 +1,6 @@
 """Periodic job of connections: a bridge that is silent, backs up or has a quarantine raises an alarm, which ends when that is over.
 
-An alarm that somebody has acknowledged is not raised again for the same silence or the same backlog.
+An alarm that a person has acknowledged is not raised again for the same silence or the same backlog.
 """
 
 from datetime import datetime, timedelta

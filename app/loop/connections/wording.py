@@ -1,4 +1,4 @@
-"""Connections in words: what state a bridge is in, and which of its numbers need somebody."""
+"""Connections in words: what state a bridge is in, and which of its numbers need a person."""
 
 from datetime import timedelta
 

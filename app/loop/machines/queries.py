@@ -32,7 +32,7 @@ def machine_named(session: Session, key: str) -> Machine:
 
 
 def machine_for(session: Session, caller: Caller, key: str, role: Role) -> Machine:
-    """The machine with this key, for its own key or somebody with the role. Raises `NotFound`, `NotAllowed`."""
+    """The machine with this key, for its own key or a person with the role. Raises `NotFound`, `NotAllowed`."""
     machine = machine_named(session, key)
     caller.must_at(machine.id, role)
     return machine

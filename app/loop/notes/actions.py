@@ -80,7 +80,7 @@ def _sent_before(session: Session, values: dict[str, Any], *, timed: bool) -> Cr
 def withdraw_note(session: Session, number: int, reason: str, caller: Caller) -> NoteRow:
     """Withdraw a note: it leaves charts and lists, and stays on record.
 
-    Raises `NotFound`; `NotAllowed` for one that somebody else has written; `Conflict` for one that is withdrawn.
+    Raises `NotFound`; `NotAllowed` for one that someone else has written; `Conflict` for one that is withdrawn.
     """
     session.execute(select(Note.id).where(Note.id == number).with_for_update())
     row = queries.note(session, number)

@@ -103,7 +103,7 @@ def write(request: Request, session: SessionDep, caller: Operator, form: FormDep
 
 @router.get("/notes/{number}")
 def note_page(request: Request, session: SessionDep, caller: Viewer, number: int, late: Number = None) -> Response:
-    """One note, and the form to withdraw it. late: somebody else was first."""
+    """One note, and the form to withdraw it. late: someone else was first."""
     return _note(request, session, caller, number, late=bool(late))
 
 
@@ -132,7 +132,7 @@ def _note(
 
 @router.post("/notes/{number}/withdraw")
 def withdraw(request: Request, session: SessionDep, caller: Operator, number: int, form: FormDep) -> Response:
-    """Withdraw the note. Sent twice, or after somebody else, it changes nothing and says so."""
+    """Withdraw the note. Sent twice, or after someone else, it changes nothing and says so."""
     try:
         actions.withdraw_note(session, number, checked(Reason, form.get("reason", ""), "reason"), caller)
     except Conflict:

@@ -116,7 +116,7 @@ def names(session: Session, numbers: Collection[int]) -> dict[int, str]:
 
 
 def messages(session: Session, receiver_id: int) -> Sequence[Delivery]:
-    """Messages of the last minute for somebody's browsers, the oldest first, those that one of them has shown too."""
+    """Messages of the last minute for a person's browsers, the oldest first, those that one of them has shown too."""
     query = select(Delivery).where(
         Delivery.receiver_id == receiver_id,
         Delivery.state.in_(("sending", "delivered")),

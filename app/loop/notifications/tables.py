@@ -20,7 +20,7 @@ DELIVERY_NUMBERS = Sequence("delivery_id", metadata=Base.metadata)
 
 
 class Receiver(Base):
-    """Somebody's mail address or browsers, a webhook, or an address of apprise. Deleted ones stay, because deliveries name them."""
+    """A person's mail address or browsers, a webhook, or an address of apprise. Deleted ones stay, because deliveries name them."""
 
     __tablename__ = "receiver"
     __table_args__ = (

@@ -62,7 +62,7 @@ def set_present(session: Session, key: str, given: PresentContextIn, caller: Cal
 def fill(session: Session, machine_id: int) -> None:
     """Put the present context on the readings that were measured since it was set and have none. Done again it changes nothing.
 
-    What a bridge kept through an outage was measured before, at a work that nobody knows any more: it gets none. The context is
+    What a bridge kept through an outage was measured before, at a work that is not known any more: it gets none. The context is
     read by the statement that finds the readings, so that a new one is never put on the readings of the old one, or the other way.
     """
     until = datetime.now(UTC) - UNDER_WAY

@@ -57,7 +57,7 @@ class CheckedProgram(NamedTuple):
 def check(text: str, control: ReadableControl | None = None, machine: Machine | None = None) -> CheckedProgram:
     """Read a text for this control, or for the one that it looks like. Raises `Invalid` for what is no program text.
 
-    machine: the one that the program is for, if somebody says it: its type and its locations are looked at too.
+    machine: the one that the program is for, if a person says it: its type and its locations are looked at too.
     """
     control = control or guessed(text)
     try:

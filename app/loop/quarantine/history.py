@@ -85,7 +85,7 @@ class _Tool:
         return bisect_right(self.changes, at)
 
     def offset(self, received_at: datetime, compensated: float | None) -> float | None:
-        """The offset of a part that was cut with so much of the corrections; None where nobody knows."""
+        """The offset of a part that was cut with so much of the corrections; None where it is not known."""
         if compensated is None:
             return None
         place = bisect_right(self.times, received_at) - 1

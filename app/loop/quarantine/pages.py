@@ -135,7 +135,7 @@ def _around(on: OfPart, _verb: Verb[OfPart, Any]) -> dict[str, Any]:
 
 
 def _decided(_request: Request, on: OfPart, verb: Verb[OfPart, Any], outcome: Outcome) -> Response:
-    """Sent twice, or after somebody else, it changes nothing and says so."""
+    """Sent twice, or after someone else, it changes nothing and says so."""
     done = {"late": on.number} if outcome.kind == "late" else {"done": verb.name, "n": on.number}
     return RedirectResponse(address(f"/quarantines/{on.quarantine}", **done) + f"#part-{on.number}", 303)
 

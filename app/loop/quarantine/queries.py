@@ -195,7 +195,7 @@ def _listed(
 def _neighbours(history: History, stretch: Stretch) -> tuple[Known | None, Known | None]:
     """The readings about a stretch: those certainly good on its edge, else the nearest of another edge, if there is one.
 
-    Which edge has cut a part without a reading between two edges, nobody knows.
+    It is not known which edge has cut a part without a reading between two edges.
     """
     known = history.known
     before, after = (known[end] if end is not None else None for end in (stretch.since, stretch.until))

@@ -22,7 +22,7 @@ QUARANTINE_NUMBERS = Sequence("quarantine_id", metadata=Base.metadata)
 
 
 class Quarantine(Base):
-    """The parts of an alarm that somebody has set aside. guard: measuring uncertainty by which the tolerance was narrowed."""
+    """The parts of an alarm that a person has set aside. guard: measuring uncertainty by which the tolerance was narrowed."""
 
     __tablename__ = "quarantine"
     __table_args__ = (

@@ -239,7 +239,7 @@ def record_of(session: Session, entry: Entry, sequence: int) -> Record:
 
 
 def uncorrected_of(session: Session, machine_id: int, characteristic_id: int, sequence: int) -> float | None:
-    """Return the deviation of a reading without the corrections its part was cut with, mm; None if nobody knows."""
+    """Return the deviation of a reading without the corrections its part was cut with, mm; None if it is not known."""
     row = session.execute(
         select(Reading.deviation, Reading.compensated, Reading.parameters_version).where(
             Reading.machine_id == machine_id,
@@ -399,7 +399,7 @@ def reasons(
 
 
 def entry_for(session: Session, caller: Caller, characteristic: str) -> Entry:
-    """The place of a characteristic, for somebody who may look at it. Raises `NotFound`, `NotAllowed`."""
+    """The place of a characteristic, for a person who may look at it. Raises `NotFound`, `NotAllowed`."""
     entry = entry_named(session, characteristic)
     caller.must_at(entry.machine_id, "viewer")
     return entry

@@ -64,7 +64,7 @@ def replay(
         if tool is not None and issued is not None and issued.status != "held":
             tool.total += issued.amount
         if verdict.decision.code is Code.IMPLAUSIBLE:
-            stream.level = None  # somebody has looked, and the next reading begins again
+            stream.level = None  # a person has looked, and the next reading begins again
         _as_if_done(pending, stream)
 
 

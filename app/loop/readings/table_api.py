@@ -1,4 +1,4 @@
-"""JSON route: readings out of a table of somebody else, as the command and the page of imports take it."""
+"""JSON route: readings out of a table of someone else, as the command and the page of imports take it."""
 
 from base64 import b64decode
 from collections.abc import Iterator

@@ -54,7 +54,7 @@ class ControlPlan(Base):
 class MissedMeasurement(Base):
     """A time in which the plan was not kept, after a reading (0: before the first); open until the next reading.
 
-    by: the rule of the plan. parts: parts that were cut and not measured, None where nobody knows; minutes: that the machine ran.
+    by: the rule of the plan. parts: parts that were cut and not measured, None where it is not known; minutes: that the machine ran.
     """
 
     __tablename__ = "missed_measurement"

@@ -35,7 +35,7 @@ class Machine(Base):
     # Of the probe's signal: direct to the control, or through the PLC.
     signal_path: Mapped[str] = mapped_column(server_default="direct")
     signal_delay: Mapped[float] = mapped_column(server_default="0.25")  # ms, of the way through the PLC
-    signal_jitter: Mapped[float | None]  # ms by which the delay varies, if somebody has measured it
+    signal_jitter: Mapped[float | None]  # ms by which the delay varies, if a person has measured it
     probing_feed: Mapped[float] = mapped_column(server_default="150")  # mm/min
     # Set-up errors beyond are warned of: of parts in degrees and mm, and of rotary axes.
     plausible_turn: Mapped[float] = mapped_column(server_default="5")

@@ -136,7 +136,7 @@ class Reading(Base):
     part: Mapped[str | None]
     outstanding: Mapped[list[int] | None] = mapped_column(ARRAY(Integer))
     alarms: Mapped[list[int] | None] = mapped_column(ARRAY(BigInteger))
-    # Corrections since the tool change that were in effect when the part was cut, summed; None where nobody knows.
+    # Corrections since the tool change that were in effect when the part was cut, summed; None where it is not known.
     compensated: Mapped[float | None]
 
 
@@ -243,7 +243,7 @@ class Exclusion(Base):
 
 
 class ImportMapping(Base):
-    """A characteristic of measuring machines' files (AQDEF: part, number, name) that somebody took for this one."""
+    """A characteristic of measuring machines' files (AQDEF: part, number, name) that a person took for this one."""
 
     __tablename__ = "import_mapping"
     __table_args__ = (

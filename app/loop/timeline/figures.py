@@ -171,7 +171,7 @@ def event_lane(
     """Marks and words of the events within the span, and in the legend what their shapes mean.
 
     span: of the axis, N pixels wide; moments as seconds (Unix time). beside: pixels that words may reach out at its
-    right. lines: upward through the chart, at what somebody changed. low: the lane has room for one row. A word is left out where it
+    right. lines: upward through the chart, at what a person changed. low: the lane has room for one row. A word is left out where it
     would not fit.
     """
     within = [event for event in events if span[0] <= _number(event.at) <= span[1]]
@@ -211,7 +211,7 @@ def event_lane(
 
 
 def _legend(events: Sequence[Event]) -> list[Series]:
-    """A name for each shape that somebody's changes have, and one for the alarms, whose zones have many."""
+    """A name for each shape that a person's changes have, and one for the alarms, whose zones have many."""
     words = {
         TOOL_CHANGE: _("Tool change"),
         MANUAL_EDIT: _("Offset edited"),

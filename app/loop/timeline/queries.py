@@ -45,7 +45,7 @@ def with_events(
 ) -> Chart:
     """A chart over the readings of a characteristic with the events of the characteristic above it.
 
-    width: in pixels, about. lines: upward at what somebody changed; without them where the chart draws its own. over: numbers of
+    width: in pixels, about. lines: upward at what a person changed; without them where the chart draws its own. over: numbers of
     the first and the last reading of a chart over time.
     """
     span = span_of(chart)
@@ -159,7 +159,7 @@ def _placed(session: Session, current: CurrentCharacteristic, first: int, last: 
         if at is None or not first <= at <= last + 1:
             continue
         past = moments[place - 1 : place] if place else before
-        # Where the next one is older than the one before, somebody has imported the past: the event is none of it.
+        # Where the next one is older than the one before, a person has imported the past: the event is none of it.
         in_order = coming is not None and (not past or past[0].measured_at <= coming.measured_at)
         late = coming.measured_at if coming and in_order and event.at == arrived > coming.measured_at else None
         placed.append(_Placed(event, sequence, at, late))

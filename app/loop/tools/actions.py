@@ -112,7 +112,7 @@ def approve_all(
 ) -> list[Correction]:
     """Approve these corrections together: all of them, or none when one cannot be approved any more.
 
-    Raises `NotFound`; `Conflict` naming the first that somebody else has decided about, and its state.
+    Raises `NotFound`; `Conflict` naming the first that someone else has decided about, and its state.
     """
     lock_machines(session, [machine.id])
     approved = [queries.correction(session, machine, number) for number in sorted(set(numbers))]
@@ -139,7 +139,7 @@ def _carry_out(
 
 
 def edit_tool(session: Session, machine: Machine, number: int, offset: float, reason: str, caller: Caller) -> Restarted:
-    """Somebody has set the offset by hand and says what it is now.
+    """A person has set the offset by hand and says what it is now.
 
     Open corrections were computed for the offset before, so they are superseded; the averages of the characteristics on
     this tool begin again at 0; parts cut before say nothing. Raises `NotFound`.
@@ -152,7 +152,7 @@ def change_tool(
 ) -> Restarted:
     """The tool was changed: all that `edit_tool` does, and its life and the sum of its corrections begin again.
 
-    Alarms about the old tool stay until somebody acknowledges them: a person was asked, and a person answers.
+    Alarms about the old tool stay until they are acknowledged: they ask a question that needs its answer.
     Raises `NotFound`.
     """
     return _set_offset(session, machine, number, offset, reason, caller, "change")

@@ -1,7 +1,7 @@
 """Confirmations of machines: a correction is in effect, and the control now holds this offset.
 
 Repeating one is harmless, also after a lost answer: the second gets the answer of the first. When the offset in the
-control differs from the expected one, nobody knows with which offset a part was cut, so the tool is paused until a
+control differs from the expected one, it is not known with which offset a part was cut, so the tool is paused until a
 person has confirmed the true offset. Lengths are mm.
 """
 

@@ -1,6 +1,6 @@
 """Corrections as program text for controls without a network: what the text holds, who fetched it, and that it is in.
 
-A text that was fetched may be run at any time. Its corrections stay pending until somebody confirms them or a reading names
+A text that was fetched may be run at any time. Its corrections stay pending until a person confirms them or a reading names
 one as in effect; those that are fetched together with later ones keep their place in front of them. Lengths are mm.
 """
 
@@ -54,7 +54,7 @@ class Handed(NamedTuple):
 
 
 class Fetched(NamedTuple):
-    """A correction that was marked. before: somebody had fetched it earlier, and that is what stands."""
+    """A correction that was marked. before: a person had fetched it earlier, and that is what stands."""
 
     correction: Correction
     before: bool

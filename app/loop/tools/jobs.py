@@ -38,7 +38,7 @@ def expire_correction(session: Session, unit: Unit) -> None:
     """One correction that has waited too long is superseded: the next reading decides again.
 
     The time runs from when it was issued, or let go by a person. Held ones wait for their alarm, however long; those that
-    were fetched as program text may be in the control by now, and wait for somebody to say so.
+    were fetched as program text may be in the control by now, and wait for a person to say so.
     """
     machine_id, number = unit.key
     lock_machines(session, [int(machine_id)])

@@ -132,7 +132,7 @@ def _correction(
 def decide(
     request: Request, session: SessionDep, caller: Operator, machine: str, number: int, form: FormDep
 ) -> Response:
-    """Approve, release, reject, or confirm that it was applied. Somebody who comes too late sees the state now."""
+    """Approve, release, reject, or confirm that it was applied. A person who comes too late sees the state now."""
     on = OfCorrection(session, machine_named(session, machine), number, caller)
     tool, came_from = on.row.correction.tool_memory, form.get("from")
     verb = named(verbs.CORRECTION, form.get("do", ""), on, _astray())

@@ -87,7 +87,7 @@ class RejectionIn(CorrectionDecisionIn):
 
 
 class ToolEdit(Body):
-    """The offset as somebody has set it by hand."""
+    """The offset as a person has set it by hand."""
 
     offset: Annotated[Length, Field(description="The offset that the control holds now, mm.")]
     reason: Reason

@@ -95,7 +95,7 @@ def mark_applied(on: OfCorrection, applied: AppliedIn) -> Decided:
     """Confirm that the correction is in the offset now. Confirming twice is harmless.
 
     An `offset_after` that differs from `offset_expected` by more than 0.0005 mm raises the alarm *offset differs*: nothing
-    is corrected through this tool until somebody has said which offset is true. If it is the offset that earlier or later
+    is corrected through this tool until a person has said which offset is true. If it is the offset that earlier or later
     pending corrections of the tool lead to, those are confirmed with this one. A machine that confirms what may not be in
     the offset is refused (409), and its `offset_after` is compared all the same.
     """
@@ -367,7 +367,7 @@ AVERAGE: tuple[Verb[OfAverage, Any], ...] = (
 
 
 def too_late(session: Session, machine: Machine, name: str, number: int) -> list[str]:
-    """The page's message where somebody else was first: how the correction is now, and what to do instead. Raises `NotFound`."""
+    """The page's message where someone else was first: how the correction is now, and what to do instead. Raises `NotFound`."""
     return list(wording.refused(queries.correction(session, machine, number), machine.key, name))
 
 

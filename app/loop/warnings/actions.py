@@ -22,7 +22,7 @@ def acknowledge(
 ) -> WarningAcknowledgement:
     """Keep that a person takes the result as it is; its program text runs from now on.
 
-    Raises `Conflict` where there is no warning, or somebody was first.
+    Raises `Conflict` where there is no warning, or someone else was first.
     """
     lock_machines(session, [machine.id])
     if not warnings:

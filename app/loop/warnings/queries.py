@@ -21,5 +21,5 @@ def acknowledgement(session: Session, machine_id: int, subject: str) -> WarningA
 
 
 def unacknowledged(session: Session, machine_id: int, subject: str, warnings: Iterable[CodedWarning]) -> list[str]:
-    """The codes of the warnings that stop a program text; none once somebody has acknowledged them."""
+    """The codes of the warnings that stop a program text; none once a person has acknowledged them."""
     return [] if acknowledgement(session, machine_id, subject) else [warning.code for warning in warnings]

@@ -22,7 +22,7 @@ LOOKED_AT = 5000
 
 @dataclass(frozen=True, slots=True)
 class Run:
-    """A run of parts: deviations and their sequences, and the readings in between that somebody excluded, or probe faults."""
+    """A run of parts: deviations and their sequences, and the readings in between that a person excluded, or probe faults."""
 
     sequence: NDArray[np.int64]
     values: Floats

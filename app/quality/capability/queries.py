@@ -2,7 +2,7 @@
 
 Every deviation is one from the target that was in force when the part was judged, and a part is good by the tolerance
 that was in force; indices take the limits of the newest reading. A natural limit is a fact of the characteristic: readings from
-before it was entered are judged by it, too. Left out are readings that somebody excluded, and probe
+before it was entered are judged by it, too. Left out are readings that a person excluded, and probe
 faults, which are no measurement of a part.
 """
 
@@ -178,7 +178,7 @@ class Judgement:
 class Study(Judgement):
     """Everything that is said of one run of readings.
 
-    excluded: sequences that somebody took out; faults: probe faults. fallout: parts outside the tolerance in force, per
+    excluded: sequences that a person took out; faults: probe faults. fallout: parts outside the tolerance in force, per
     million; outside: how many. without: None where nothing is compensated; unknown: readings of it that do not say with which
     corrections they were cut. tolerance: the interval that holds a share of all parts.
     """

@@ -61,7 +61,7 @@ def suited(session: Session, current: CurrentCharacteristic) -> Quantity:
     readings = read(session, current, plan, Window(max(1, newest - LOOKED_AT + 1), newest, newest))
     try:
         line = _line(readings.series)
-    except Refused:  # nobody knows yet
+    except Refused:  # it is not known yet
         return wording.suits(corrects=True, wears=True)
     return wording.suits(corrects=True, wears=abs(line.slope) > WEARS * line.error)
 

@@ -45,7 +45,7 @@ class Do(StrEnum):
 class Setting:
     """A rule that is switched on.
 
-    It begins after the reading `since` (0: with the baseline), and never before its baseline came into force; unless somebody
+    It begins after the reading `since` (0: with the baseline), and never before its baseline came into force; unless a person
     has asked for what lies between the period of the baseline `back` and now.
     """
 
@@ -61,12 +61,12 @@ class Setting:
 Rules = dict[Place, dict[RuleName, Setting]]
 
 DEFAULT: Rules = {Place.MAIN: {RuleName.NELSON_1: Setting(Do.WATCH)}}
-"""Until somebody says otherwise points beyond the limits are kept as signals: by chance one in 370. Nothing raises an alarm."""
+"""Until it is set otherwise, points beyond the limits are kept as signals: by chance one in 370. Nothing raises an alarm."""
 
 
 @dataclass(frozen=True, slots=True)
 class Watched:
-    """The rules in force. version 0: the default, which nobody has set."""
+    """The rules in force. version 0: the default, which is not set."""
 
     rules: Rules
     version: int = 0

@@ -111,7 +111,7 @@ class ControlPage:
 
     @cached_property
     def kept(self) -> list[SignalRow]:
-        """Signals that nobody has explained yet, newest first; one more than the page lists if there are more."""
+        """Signals that are not explained yet, newest first; one more than the page lists if there are more."""
         return signals_queries.signals(
             self._session, characteristic=self.current.characteristic, state="open", limit=KEPT + 1
         )

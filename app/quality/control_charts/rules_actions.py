@@ -36,7 +36,7 @@ def set_rules(
     """These rules watch from the next reading on, and no others.
 
     look_back: the readings since the period of the baseline are judged too; they raise no alarm. seen: the version that
-    was changed. Raises `Invalid` for a rule that has no sense on its chart; `Conflict` if somebody was faster.
+    was changed. Raises `Invalid` for a rule that has no sense on its chart; `Conflict` if someone else was faster.
     """
     characteristic = current.characteristic
     session.execute(  # versions count without gaps: of two who change the rules at once, one waits
@@ -88,7 +88,7 @@ def set_rules(
 
 
 def _check(wanted: Wanted, fitting: Mapping[Place, tuple[RuleName, ...]], *, strict: bool) -> None:
-    """Without a baseline nobody knows which charts there will be: then only what never has a sense is refused."""
+    """Without a baseline it is not known which charts there will be: then only what never has a sense is refused."""
     wrong = [
         FieldError(
             f"rules.{place.value}.{name.value}",

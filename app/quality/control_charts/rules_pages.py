@@ -108,7 +108,7 @@ def ticked(form: Mapping[str, str]) -> dict[str, dict[str, str]]:
 
 
 def typed(form: Mapping[str, str], before: Rules) -> Rules:
-    """The same as rules, without what nobody knows; what was on before goes on from where it began."""
+    """The same as rules, without what is not known; what was on before goes on from where it began."""
     rules: Rules = {}
     for place, named in ticked(form).items():
         for name, do in named.items():

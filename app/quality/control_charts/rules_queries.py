@@ -36,7 +36,7 @@ SELDOM = 0.01  # so rarely chance alone brings as many signals
 
 
 def rules_in_force(session: Session, characteristic: Characteristic) -> Watched:
-    """The newest version of the rules; the default where nobody has set any."""
+    """The newest version of the rules; the default where none is set."""
     newest = session.scalars(
         select(RuleSet)
         .where(RuleSet.machine_id == characteristic.machine_id, RuleSet.characteristic_id == characteristic.id)

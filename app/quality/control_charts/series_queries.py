@@ -47,7 +47,7 @@ class Plan(Protocol):
 class LeftOut:
     """Readings that count for nothing, by their sequences, each once.
 
-    excluded: from all statistics. by_baseline: from its own period. faults: of the probe (R36). unknown: nobody knows with
+    excluded: from all statistics. by_baseline: from its own period. faults: of the probe (R36). unknown: it is not known with
     which corrections their part was cut.
     """
 

@@ -28,7 +28,7 @@ class SignalRow(NamedTuple):
 
     @property
     def state(self) -> SignalState:
-        """Open until somebody has said what it was: of the signal itself, or by acknowledging its alarm."""
+        """Open until a person has said what it was: of the signal itself, or by acknowledging its alarm."""
         if self.signal.withdrawn_at is not None:
             return "withdrawn"
         answered = self.alarm is not None and self.alarm.acknowledged_at is not None
@@ -67,7 +67,7 @@ def signal(session: Session, number: int) -> SignalRow:
 
 
 def unknown(number: int) -> NotFound:
-    """Nobody knows this signal, or not here."""
+    """This signal is not known, or not here."""
     return NotFound(
         _("There is no signal {number}.").format(number=number),
         _("Check the number; GET /api/v1/signals lists them."),

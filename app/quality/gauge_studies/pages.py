@@ -178,7 +178,7 @@ def _source(session: Session, kind: str, typed: Mapping[str, str], given: StudyI
         return None
     values = [[round(value, 9) for value in row["values"]] for row in rows]
     if values != [[round(value, 9) for value in row.values] for row in given.rows]:
-        return None  # somebody has typed over it
+        return None  # a person has typed over it
     return actions.source_of(session, current, *numbers, take)
 
 

@@ -262,7 +262,7 @@ def _between(current: CurrentCharacteristic, first: int, through: int) -> tuple[
 
 
 def _useless() -> ColumnElement[bool]:
-    """Readings that somebody excluded, and probe faults: they tell of no gauge, as they tell of no process."""
+    """Readings that a person excluded, and probe faults: they tell of no gauge, as they tell of no process."""
     excluded = (
         select(Exclusion.sequence)
         .where(

@@ -35,7 +35,7 @@ class Entry(NamedTuple):
 
 
 class OfCharacteristic(NamedTuple):
-    """A characteristic of the ledger. unknown: readings left out, because nobody knows their corrections."""
+    """A characteristic of the ledger. unknown: readings left out, because their corrections are not known."""
 
     key: str
     name: str

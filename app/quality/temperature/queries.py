@@ -26,8 +26,8 @@ class Study(NamedTuple):
     """Readings and their drift; `refused` where they carry none.
 
     of: whose temperature it is; both: part and machine have some. readings, stated: that count, and those of them with a
-    temperature. unknown: left out, for nobody knows with which corrections their part was cut. rebuilt: with the corrections
-    taken out; worn: left out, of worn or broken tools. Of readings whose corrections nobody knows sizes are as they came out. expected: by the expansion alone, mm/K.
+    temperature. unknown: left out, for it is not known with which corrections their part was cut. rebuilt: with the corrections
+    taken out; worn: left out, of worn or broken tools. Of readings whose corrections are not known sizes are as they came out. expected: by the expansion alone, mm/K.
     """
 
     current: CurrentCharacteristic
@@ -99,7 +99,7 @@ def study_of(
 
 
 def _readings(session: Session, current: CurrentCharacteristic, window: Window) -> tuple[ReadingSeries, bool]:
-    """Sizes without corrections; as they came out where nobody knows any correction, as of imports."""
+    """Sizes without corrections; as they came out where no correction is known, as of imports."""
     plan = Baseline(
         quantity=Quantity.WITHOUT_CORRECTIONS.value,
         excluded=[],

@@ -77,7 +77,7 @@ def _ask(
 
 @router.post("/characteristics/{characteristic}/trial/start")
 def start(request: Request, session: SessionDep, caller: Engineer, characteristic: str, form: FormDep) -> Response:
-    """End the trial. Sent twice, or after somebody else, it changes nothing and says so."""
+    """End the trial. Sent twice, or after someone else, it changes nothing and says so."""
     on = OfTrial(session, characteristic, caller, _settings_of(form))
     try:
         outcome = carry_out(START, on, form)

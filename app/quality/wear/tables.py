@@ -28,7 +28,7 @@ class Outlook(Base):
     towards: Mapped[str | None]  # wear, tolerance or offset; None where no wear is to be seen
     parts: Mapped[float | None]
     parts_low: Mapped[float | None]
-    parts_high: Mapped[float | None]  # None: nobody can say how long at most
+    parts_high: Mapped[float | None]  # None: it cannot be determined how long at most
     hunting: Mapped[str]  # unknown, quiet, hunting or swinging
     # How the forecasts of edges before came out (`app.core.forecast.Record`); None until there was a tool change.
     record_of: Mapped[int | None] = mapped_column(

@@ -25,7 +25,7 @@ def per_part(slope: float, decimals: int = 3) -> str:
 
 
 def rounded(parts: float) -> int:
-    """Two digits: more nobody knows.
+    """Two digits: no more are known.
 
     >>> rounded(143.2), rounded(7.6), rounded(0)
     (140, 8, 0)

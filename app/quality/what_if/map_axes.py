@@ -1,4 +1,4 @@
-"""The settings that a map shows unless somebody names others: round values of k and R33, today's among them. mm."""
+"""The settings that a map shows unless a person names others: round values of k and R33, today's among them. mm."""
 
 from bisect import bisect_left
 from collections.abc import Sequence

@@ -50,7 +50,7 @@ __all__ = [
     "turn",
 ]
 
-USUAL = USUAL_READINGS  # that are replayed unless somebody says otherwise
+USUAL = USUAL_READINGS  # that are replayed unless it is set otherwise
 SETTINGS = ("zero_range", "averaging_limit", "weighting_factor", "factor")
 MOST_CELLS = 2_500
 MOST_DECISIONS = 200_000_000  # in one map: some seconds
@@ -133,7 +133,7 @@ class Simulation:
 
     @cached_property
     def effect(self) -> Effect | Refused:
-        """The measured effect of past corrections, or why nobody can say."""
+        """The measured effect of past corrections, or why it cannot be determined."""
         return effect_of(self.past)
 
 

@@ -1,4 +1,4 @@
-"""From what somebody asks to what is replayed, one at a turn."""
+"""From what a person asks to what is replayed, one at a turn."""
 
 from dataclasses import replace
 

@@ -1,4 +1,4 @@
-"""Changes of parameters that somebody proposes, with the evidence, and what became of them."""
+"""Changes of parameters that a person proposes, with the evidence, and what became of them."""
 
 from datetime import datetime
 from typing import Any

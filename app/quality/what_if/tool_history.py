@@ -1,7 +1,7 @@
 """True history of a tool, as a replay needs it: readings, edges, pauses, and the parameters of then. Never writes.
 
 A tool that several characteristics correct is replayed with all of them: each keeps deciding as it did, and only the
-one that is asked about gets other settings. Readings that nobody knows the corrections of (cut before a tool change,
+one that is asked about gets other settings. Readings whose corrections are not known (cut before a tool change,
 imported, or from before that was kept) are left out, and counted. Where all that are known were imported, they are a process
 that this loop never corrected, and are replayed as that.
 """
@@ -164,7 +164,7 @@ class ToolHistory:
     def named(self) -> dict[str, list[int]]:
         """Readings that count for nothing, and those that count for neither mean nor spread, by their numbers.
 
-        excluded: somebody took them out; faults: of the probe; worn: in the wear zone, which is an operator's business.
+        excluded: a person took them out; faults: of the probe; worn: in the wear zone, which is an operator's business.
         """
         history = self.history
         fault, counted = history["zone"] == FAULT, ~history.excluded

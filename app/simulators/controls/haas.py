@@ -1,7 +1,7 @@
 """A simulated Haas NGC: machine data collection by TCP, with what the manual warns of.
 
 Two connections at most. Every answer goes to all connections, and says no variable's number. The first ``?Q100`` of a connection
-stays without an answer. A variable that nobody has set is empty.
+stays without an answer. A variable that is not set is empty.
 """
 
 import asyncio

@@ -30,7 +30,7 @@ class Gauged:
     gauge: float
     drift: Sequence[float]
     plan: dict[str, Any]
-    last_waits: bool = False  # the last one is to be accepted by somebody
+    last_waits: bool = False  # the last one is to be accepted by a person
     dirty: int | None = None  # which one met a dirty gauge
 
 

@@ -35,7 +35,7 @@ def file_of(settings: Settings) -> Path:
 def sign_ins(database: Database, settings: Settings) -> dict[str, str]:
     """The people who may sign in, with their passwords; they are made at the first start.
 
-    Raises `InbandError` on a database that holds somebody's own plant.
+    Raises `InbandError` on a database that holds a plant of the user's own.
     """
     path = file_of(settings)
     known = _kept(path)

@@ -232,7 +232,7 @@ class Line:
     def _fetch_corrections(self) -> None:
         for correction in self._gateway.pending(self.key):
             edge = self.machine.edges.get(correction.tool_memory)
-            if edge is None:  # a location that somebody else uses
+            if edge is None:  # a location that someone else uses
                 continue
             offset = None
             if correction.number not in edge.applied:  # else it is in the offset already, with those after it
@@ -243,7 +243,7 @@ class Line:
                 log.info("%s: %s", self.key, refusal)
 
     def _follow_tool_memory(self) -> bool:
-        """Take the offsets of the tool memory into the control; tell if somebody changed a tool."""
+        """Take the offsets of the tool memory into the control; tell if a person changed a tool."""
         changed = False
         for number, tool in self._tools().items():
             edge = self.machine.edges[number]

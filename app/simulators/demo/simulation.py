@@ -166,7 +166,7 @@ class Machine:
         return True
 
     def fresh_edge(self, number: int, offset: float) -> None:
-        """Somebody put a fresh edge in and set its offset."""
+        """A person put a fresh edge in and set its offset."""
         self.edges[number].replace(offset, self._setting_error())
 
     def settle(self, offsets: dict[int, float]) -> None:
@@ -177,7 +177,7 @@ class Machine:
             edge.bias = -feature.effect.gain * edge.offset - feature.effect.wears * edge.recession
 
     def clean_stylus(self) -> None:
-        """Somebody wiped the stylus."""
+        """A person wiped the stylus."""
         self.dirt = 0.0
 
     def _setting_error(self) -> float:

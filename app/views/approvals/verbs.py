@@ -48,7 +48,7 @@ class OfTool(OfMachine):
 
     @property
     def decided(self) -> Correction:
-        """The first of those shown that somebody has decided about meanwhile."""
+        """The first of those shown that a person has decided about meanwhile."""
         shown = (queries.correction(self.session, self.machine, number) for number in self.numbers)
         return next(correction for correction in shown if correction.status != "awaiting_approval")
 

@@ -66,7 +66,7 @@ class CharacteristicRow:
 
     @property
     def overcorrects(self) -> bool:
-        """Tell if its loop over-corrects, whether or not somebody has noted that."""
+        """Tell if its loop over-corrects, whether or not a person has noted that."""
         return self.outlook is not None and self.outlook.hunting in OVERCORRECTS
 
     @property
@@ -230,7 +230,7 @@ def _trends(session: Session, machine_id: int | None) -> dict[int, tuple[list[fl
 def last_of(session: Session, entry: Entry, stream: Stream) -> list[Record]:
     """Return the last reading that was decided, if there is one.
 
-    The highest number may be that of an older reading, which somebody has imported since.
+    The highest number may be that of an older reading, which a person has imported since.
     """
     found = readings.latest(session, entry, None, 1)
     if found and (found[0].received_at, found[0].measured) != (stream.last_received_at, stream.last_measured):

@@ -1,4 +1,4 @@
-"""The documents of `docs/`: rendered once when somebody opens one, with links that lead to pages of the program; their sections.
+"""The documents of `docs/`: rendered once when a person opens one, with links that lead to pages of the program; their sections.
 
 Raw HTML in them is shown as it is written; a document that is not there when the program starts is no page.
 """

@@ -23,7 +23,7 @@ class AttentionReason(IntEnum):
     STOPPED = 1  # probe fault, paused, tool worn, held
     OUTSIDE = 2  # the last part was out of tolerance
     ALARM = 3
-    APPROVAL = 4  # somebody has to release a correction
+    APPROVAL = 4  # a person has to release a correction
     NOT_EVALUATED = 5  # background work on it fails: what follows may be missing
     SIGNAL = 6
     NOT_CAPABLE = 7  # index below 1

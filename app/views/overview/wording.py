@@ -20,7 +20,7 @@ class Reason(NamedTuple):
 
     @property
     def urgent(self) -> bool:
-        """True if the list shows it in colour: somebody is needed now."""
+        """True if the list shows it in colour: a person is needed now."""
         return self.reason <= AttentionReason.NOT_EVALUATED
 
     @property

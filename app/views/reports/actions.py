@@ -129,7 +129,7 @@ def take(session: Session, number: int, token: str) -> dict[str, Any] | None:
 
 
 def begin(session: Session, number: int, token: str, key: str) -> bool:
-    """Say which characteristic is worked on. False if it was cancelled, or is somebody else's by now."""
+    """Say which characteristic is worked on. False if it was cancelled, or is someone else's by now."""
     return _still_ours(session, number, token, current=key)
 
 

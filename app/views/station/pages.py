@@ -198,7 +198,7 @@ def _ask_alarm(
 def acknowledge(
     request: Request, session: SessionDep, at: Station, machine: str, number: int, form: FormDep
 ) -> Response:
-    """Acknowledge the alarm. Sent twice, or after somebody else, it changes nothing and says so."""
+    """Acknowledge the alarm. Sent twice, or after someone else, it changes nothing and says so."""
     row = queries.alarm_of_machine(session, machine, number)
     try:
         outcome = alarm_verbs.acknowledge(session, number, form, who(request, session, at, form))
@@ -287,7 +287,7 @@ def _ask_correction(
 
 @router.post("/{machine}/corrections/{number}")
 def decide(request: Request, session: SessionDep, at: Station, machine: str, number: int, form: FormDep) -> Response:
-    """Approve, release or reject a correction, or say that it is in the control. Somebody who comes too late sees the state now."""
+    """Approve, release or reject a correction, or say that it is in the control. A person who comes too late sees the state now."""
     on = OfCorrection(session, machine_named(session, machine), number, NOBODY)
     verb = named(verbs.CORRECTION, form.get("do", ""), on, _("Go back to the station of the machine."))
     try:

@@ -196,7 +196,7 @@ def _quarantines(session: Session, machine: Machine | None) -> Iterator[Task]:
 
 
 def _proposals(session: Session, machine: Machine | None) -> Iterator[Task]:
-    for status in ("open", "outdated"):  # an outdated one is open still: somebody rejects it
+    for status in ("open", "outdated"):  # an outdated one is open still: a person rejects it
         rows = what_if.proposals(session, machine_id=machine.id if machine else None, status=status, limit=MOST)
         for row in reversed(rows):
             yield Task(

@@ -62,7 +62,7 @@ class Form:
 
     @property
     def could_be_new(self) -> list[Content]:
-        """Those that nobody has chosen and that can be set up."""
+        """Those that are not chosen and that can be set up."""
         return [each for each in self.found if each.index not in self.chosen and not each.obstacle and not each.not_new]
 
 

@@ -1,4 +1,4 @@
-"""Characteristics of AQDEF files and those here, as somebody matched them before; readings that came before. Never writes."""
+"""Characteristics of AQDEF files and those here, as a person matched them before; readings that came before. Never writes."""
 
 from datetime import timedelta
 

@@ -323,7 +323,7 @@ def _with_origin(values: dict[str, Any]) -> dict[str, Any]:
 
 
 def _is_missing(size: str, layout: Layout) -> bool:
-    if size == spreadsheet.NO_RESULT:  # nobody knows what it would be
+    if size == spreadsheet.NO_RESULT:  # it is not known what it would be
         return False
     return size in layout.missing or (NO_DIGIT in layout.missing and not any(map(str.isdigit, size)))
 
@@ -359,7 +359,7 @@ def _readers(layout: Layout) -> list[_Reader]:
 
 
 def _or_none(text: str, zone: ZoneInfo | None) -> datetime | None:
-    """A time that Inband wrote; of a file that somebody has changed, none."""
+    """A time that Inband wrote; of a file that a person has changed, none."""
     try:
         return cell_values.moment(text, zone)
     except Unreadable:

@@ -37,7 +37,7 @@ def contents(layout: Layout) -> list[Content]:
 
 
 def missing(layout: Layout, chosen: Collection[int]) -> tuple[list[Content], list[Content]]:
-    """Those that nobody has chosen: which can be set up, and which cannot."""
+    """Those that are not chosen: which can be set up, and which cannot."""
     others = [each for each in contents(layout) if each.index not in chosen]
     return [each for each in others if not each.not_new], [each for each in others if each.not_new]
 

@@ -130,7 +130,7 @@ class Layout:
         return self.names or self.header
 
     def refuse_doubt(self) -> None:
-        """Refuse to take sizes whose unit nobody can tell for millimetres. Raises `Invalid`."""
+        """Refuse to take sizes of an uncertain unit for millimetres. Raises `Invalid`."""
         if self.doubt:
             words = _("The lines above the table name the unit {unit}, and nobody can tell of which numbers.")
             what = _("Say in which unit the numbers of the table are: {units}.").format(units=", ".join(LENGTHS))
@@ -259,7 +259,7 @@ def _csv_layout(path: Path, wishes: Wishes, zone: ZoneInfo | None, kind: str = "
     bare: bool | None = False
     if wishes.header_line is None:
         bare = is_reading(found, top, columns.get("measured", ()), columns.get("measured_at", ()))
-        if bare is None and wishes.first_line is not None:  # somebody has said what it is
+        if bare is None and wishes.first_line is not None:  # a person has said what it is
             bare = wishes.first_line <= head
     if bare:  # there is no heading: this line is a reading
         numbered = tuple(_("Column {n}").format(n=at) for at in range(1, len(header) + 1))

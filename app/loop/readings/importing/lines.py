@@ -43,7 +43,7 @@ def lines(
 
 
 def look_apart(path: Path, wishes: Wishes, name: str) -> Looked:
-    """Look at a file of somebody else, in a process of its own. Raises `Invalid`."""
+    """Look at a file of someone else, in a process of its own. Raises `Invalid`."""
     try:
         return apart(looked, path, wishes, name)
     except Unusable as error:
@@ -52,7 +52,7 @@ def look_apart(path: Path, wishes: Wishes, name: str) -> Looked:
 
 @contextmanager
 def read_apart(path: Path, layouts: Sequence[Layout], most: int | None = None) -> Iterator[Read]:
-    """Read a file of somebody else in a process of its own, its first `most` lines: here are values only.
+    """Read a file of someone else in a process of its own, its first `most` lines: here are values only.
 
     Raises `Invalid` at a limit.
     """

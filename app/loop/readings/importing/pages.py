@@ -186,7 +186,7 @@ def _aqdef_preview(
 
 
 def _wide_preview(request: Request, upload: Upload, said: Mapping[str, str], *, status: int) -> Response:
-    """The preview of a wide sheet: a characteristic for each column, guessed by its name until somebody has chosen."""
+    """The preview of a wide sheet: a characteristic for each column, guessed by its name until a person has chosen."""
     with _database(request).sessions() as session:
         known = characteristics.characteristics(session)
     layout: Layout | None = None

@@ -64,7 +64,7 @@ def columns_by_name(layout: Layout, known: Sequence[CurrentCharacteristic]) -> d
 
 
 def layout_of(layout: Layout, column: Column, unit: str | None) -> Layout:
-    """The layout by which one column is read; without a unit that somebody said, that of its header counts, else mm."""
+    """The layout by which one column is read; without a unit that a person said, that of its header counts, else mm."""
     if layout.names:
         return replace(layout, only=layout.names[column.place])
     fields = {
@@ -141,7 +141,7 @@ def import_apart(
     dry_run: bool = False,
     machine: str | None = None,
 ) -> list[ColumnResult]:
-    """The same with a file of somebody else, which is read once, in a process of its own."""
+    """The same with a file of someone else, which is read once, in a process of its own."""
     _refuse_twice(columns)
     layout.refuse_question()
     with read_apart(path, [_layout_of(layout, column, unit) for column in columns]) as read:
@@ -150,7 +150,7 @@ def import_apart(
 
 
 def _layout_of(layout: Layout, column: Column, unit: str | None) -> Layout:
-    """The same for a column whose unit nobody knows: it is refused when its turn comes, with its name."""
+    """The same for a column whose unit is not known: it is refused when its turn comes, with its name."""
     try:
         return layout_of(layout, column, unit)
     except Invalid:

@@ -58,7 +58,7 @@ def decide_one_by_one(
 def _decide_forms(pending: PendingWrites, verdict: Verdict, now: datetime) -> None:
     """Decide the results of a reading that are characteristics of their own, as readings of the same part with the same key.
 
-    A key that somebody has given another size there before keeps that size: the reading itself is not refused for it.
+    A key that a person has given another size there before keeps that size: the reading itself is not refused for it.
     """
     reading = verdict.reading
     for entry, form in verdict.stream.start.forms:

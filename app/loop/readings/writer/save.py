@@ -51,7 +51,7 @@ async def save(pipeline: Pipeline, pending: PendingWrites, *, begun: bool, notif
     """Write everything that is pending and commit it.
 
     begun: the machines are locked already; otherwise all of it happens in one round trip. notify: wake who listens to the
-    journal of events. Raises psycopg's errors; `DivisionByZero` when somebody has changed a machine since the snapshot was
+    journal of events. Raises psycopg's errors; `DivisionByZero` when a person has changed a machine since the snapshot was
     loaded.
     """
     touched = list(pending.touched.values())

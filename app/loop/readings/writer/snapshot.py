@@ -56,7 +56,7 @@ class NamedCorrection(NamedTuple):
 class LoadedTool(msgspec.Struct, frozen=True, kw_only=True, array_like=True):
     """One location of the tool memory (R10), with its corrections in the order of their numbers. mm.
 
-    set_by_hand: somebody has set the offset since the tool was changed. paused_by: the alarm that pauses it. Of the applied
+    set_by_hand: a person has set the offset since the tool was changed. paused_by: the alarm that pauses it. Of the applied
     corrections there are those with a higher number than `since_number`, and those applied after `since`. applied: numbers
     and amounts of the newest, to name them by. untaken: the newest alarm that
     the machine does not take them, and the last of which it spoke.

@@ -2,7 +2,7 @@
 
 Optimistic: what readings are decided against stays in memory after the commit. The next ones are decided on that snapshot
 at once, and lock, proof that it still is what the database holds (`statements.GUARD`), rows and commit travel together: an
-optimistic lock. Pessimistic: when somebody else has changed the machine meanwhile, nothing is stored, and it is done again
+optimistic lock. Pessimistic: when someone else has changed the machine meanwhile, nothing is stored, and it is done again
 on what is loaded under the lock.
 """
 

@@ -78,7 +78,7 @@ def window_of(
     """The readings first … through; of them those with the context; of them the newest `last`; of them those measured in the period.
 
     usable: where nobody has asked for a number: neither excluded readings nor probe faults count for `last`, up to `MOST_COUNTED`, so that an index of the last
-    1000 stays one of 1000 readings when somebody excludes one. Not so with a context.
+    1000 stays one of 1000 readings when a person excludes one. Not so with a context.
     """
     newest = newest_of(session, characteristic)
     low, high = max(1, first or 1), min(newest, newest if through is None else through)
