@@ -311,18 +311,22 @@ def bad_queries(operation: Operation, place: Place, of: int) -> Complaints:
             yield complaint(answer, f"{name}={value}")
 
 
-def no_key(operation: Operation, place: Place) -> Complaints:
-    """Somebody whom nobody knows."""
+STRANGERS: tuple[dict[str, str], ...] = (
+    {},
+    {"Authorization": "Bearer inband_x"},
+    {"Authorization": "Basic YTpi"},
+    {"Cookie": "inband_session=x"},
+)
+
+
+def no_key(operation: Operation, place: Place, of: int = 1) -> Complaints:
+    """Without a key, and with one in so many of what is none."""
     if not operation.path.startswith("/api/v1/") or "openapi" in operation.path:
         return
     content = as_text(operation, place.body(operation)) if operation.name in BODIES else None
     url = place.url(operation, key=1)
-    for headers in (
-        {},
-        {"Authorization": "Bearer inband_x"},
-        {"Authorization": "Basic YTpi"},
-        {"Cookie": "inband_session=x"},
-    ):
+    turn = len(operation.name)
+    for headers in (STRANGERS[0], *STRANGERS[1:][turn % of :: of]):
         answer = place.nobody.request(
             operation.method, url, content=content, headers=headers | {"Content-Type": "application/json"}
         )
@@ -364,7 +368,7 @@ def test_every_operation_with_a_body_is_tried() -> None:
 
 
 some_or_all = pytest.mark.parametrize(
-    "of", [pytest.param(8, id="some"), pytest.param(1, id="all", marks=pytest.mark.long)]
+    "of", [pytest.param(16, id="some"), pytest.param(1, id="all", marks=pytest.mark.long)]
 )
 
 
@@ -394,7 +398,14 @@ def test_bad_addresses_and_queries(attempt: Callable[..., Complaints], share: in
 
 
 @pytest.mark.parametrize("share", range(SHARES))
-@pytest.mark.parametrize("attempt", [no_key, wrong_methods])
+@pytest.mark.parametrize(
+    "attempt",
+    [
+        pytest.param(partial(no_key, of=3), id="no_key-some"),
+        pytest.param(no_key, id="no_key-all", marks=pytest.mark.long),
+        wrong_methods,
+    ],
+)
 def test_at_every_operation(attempt: Try, share: int, place: Place) -> None:
     refused_and_nothing_stored(attempt, operations()[share::SHARES], place)
 
