@@ -121,7 +121,9 @@ def _settings() -> str:
 
 
 def _number(value: float | None) -> str:
-    return "" if value is None else f"{value:,g}".replace(",", " ")
+    if value is None:
+        return ""
+    return f"{value:,g}".replace(",", " ") if value == 0 or abs(value) >= 1e-4 else f"{value:.9f}".rstrip("0")
 
 
 def _values(field: Field) -> str:
