@@ -11,29 +11,24 @@ import os
 from app.core.printed_line import DECIMALS, END, START, Printed, check_of
 from app.core.ring import SLOTS, Register, Slot, Unit
 from app.simulators.controls.model import Feature, Model
+from app.simulators.controls.tcp_control import TcpControl
 
 FEATURES = (Feature(),)
 TICK = 0.01  # s
 
 
-class PrintingSimulator:
+class PrintingSimulator(TcpControl):
     """One control that is running. device: its pseudo terminal. parity: seven bits and even parity, as 7E1 sends them."""
 
     def __init__(self, model: Model, *, parity: bool = False) -> None:
-        self.model = model
+        super().__init__(model)
         self.parity = parity
-        self.port = 0
         self.device = ""
-        self._server: asyncio.Server | None = None
-        self._writers: set[asyncio.StreamWriter] = set()
         self._terminal: tuple[int, int] | None = None
-        self._task: asyncio.Task[None] | None = None
         self._printed = 0
 
     async def start(self, port: int) -> None:
         """Listen; 0 takes a free port."""
-        self._server = await asyncio.start_server(self._serve, "127.0.0.1", port)
-        self.port = self._server.sockets[0].getsockname()[1]
         if hasattr(os, "openpty"):  # Windows has no pseudo terminals
             import tty
 
@@ -41,46 +36,24 @@ class PrintingSimulator:
             tty.setraw(theirs)
             os.set_blocking(ours, False)
             self._terminal, self.device = (ours, theirs), os.ttyname(theirs)
-        self._task = asyncio.create_task(self._print_new())
+        await super().start(port)
 
     async def stop(self) -> None:
         """End it."""
-        if self._task is not None:
-            self._task.cancel()
-            await asyncio.gather(self._task, return_exceptions=True)
-        if self._server is not None:
-            self._server.close()
-        self.cut()
+        await super().stop()
         for end in self._terminal or ():
             os.close(end)
         self._terminal = None
-
-    def cut(self) -> None:
-        """The network fails: every connection ends."""
-        for writer in self._writers:
-            writer.transport.abort()
-
-    @property
-    def connections(self) -> int:
-        """Number of connections by TCP."""
-        return len(self._writers)
 
     def table(self) -> dict[str, object]:
         """The table of a machine in the configuration."""
         return self.model.table("dprnt", {"connect": f"127.0.0.1:{self.port}"}, corrections="none")
 
-    async def _serve(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
-        self._writers.add(writer)
-        try:
-            while await reader.read(1024):
-                pass
-        except OSError:
+    async def _talk(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+        while await reader.read(1024):
             pass
-        finally:
-            self._writers.discard(writer)
-            writer.close()
 
-    async def _print_new(self) -> None:
+    async def _work(self) -> None:
         parts = self.model.parts
         while True:
             for epoch, slot in self.model.written[self._printed :]:
@@ -126,7 +99,7 @@ class PrintingSimulator:
         """Send bytes to everybody who listens."""
         if self.parity:
             data = bytes(byte | (0x80 if byte.bit_count() % 2 else 0) for byte in data)
-        for writer in self._writers:
+        for writer in self._connected:
             if not writer.is_closing():
                 writer.write(data)
         if self._terminal is not None:

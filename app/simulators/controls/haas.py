@@ -11,6 +11,7 @@ import re
 from app.bridge.kinds.haas import DATE, PARAMETERS, TIME_OF_DAY
 from app.core.ring import SIZE
 from app.simulators.controls.model import Feature, Model
+from app.simulators.controls.tcp_control import TcpControl
 
 FEATURES = (Feature(register="wear_length", parameter=PARAMETERS["wear_length"]),)
 CONNECTIONS = 2
@@ -19,37 +20,16 @@ QUERY = re.compile(r"\?Q(\d+)\s*(\d*)\s*$", re.IGNORECASE)
 WRITE = re.compile(r"\?E(\d+)\s+([-+]?\d*\.?\d*)\s*$", re.IGNORECASE)
 
 
-class HaasSimulator:
+class HaasSimulator(TcpControl):
     """One control that is running. variables: those that are neither in the block nor an offset of the model."""
 
     def __init__(self, model: Model, first: int = 10800, latency: float = LATENCY) -> None:
-        self.model = model
+        super().__init__(model)
         self.first = first
         self.latency = latency
-        self.port = 0
         self.variables: dict[int, float] = {5041: 234.567}
         self.queries = 0
-        self._clients: dict[asyncio.StreamWriter, asyncio.Task[None] | None] = {}
-        self._server: asyncio.Server | None = None
         self._lock = asyncio.Lock()
-
-    async def start(self, port: int) -> None:
-        """Listen; 0 takes a free port."""
-        self._server = await asyncio.start_server(self._serve, "127.0.0.1", port)
-        self.port = self._server.sockets[0].getsockname()[1]
-
-    async def stop(self) -> None:
-        """End it, with all connections."""
-        if self._server is not None:
-            self._server.close()
-        self.cut()
-        tasks = [task for task in self._clients.values() if task is not None]
-        await asyncio.gather(*tasks, return_exceptions=True)
-
-    def cut(self) -> None:
-        """The cable is pulled: every connection ends."""
-        for writer in self._clients:
-            writer.transport.abort()
 
     def table(self) -> dict[str, object]:
         """The table of a machine in the configuration."""
@@ -58,13 +38,11 @@ class HaasSimulator:
             "haas", reached, identity=self.model.serial, proof_needed=False, location=self.model.locations
         )
 
-    async def _serve(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
-        if len(self._clients) >= CONNECTIONS:
-            writer.close()
+    async def _talk(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+        if self.connections > CONNECTIONS:
             return
-        self._clients[writer] = asyncio.current_task()
         greeted = False
-        try:
+        with contextlib.suppress(ValueError):  # a line too long
             while line := await reader.readline():
                 text = line.decode("ascii", "replace").strip()
                 if not greeted and text.upper() == "?Q100":
@@ -74,16 +52,10 @@ class HaasSimulator:
                     async with self._lock:
                         await asyncio.sleep(self.latency)
                         self.broadcast(self.answer(text))
-        except (OSError, ValueError):
-            pass
-        finally:
-            self._clients.pop(writer, None)
-            with contextlib.suppress(OSError):
-                writer.close()
 
     def broadcast(self, line: str) -> None:
         """Send a line to all connections."""
-        for writer in self._clients:
+        for writer in self._connected:
             if not writer.is_closing():
                 writer.write(f"{line}\r\n".encode())
 

@@ -12,6 +12,7 @@ from app.bridge.kinds.heidenhain import Answered, answer_check
 from app.core.printed_line import Printed, line_of
 from app.core.ring import Mail, Register, Slot, Told, Unit, mail_registers
 from app.simulators.controls.model import Feature, Model
+from app.simulators.controls.tcp_control import TcpControl
 
 FEATURES = (Feature(tool=3, register="QR31", parameter=31, holds="radius"),)
 READINGS, CORRECTIONS = "TNC:\\inband\\readings.txt", "TNC:\\inband\\corr.h"
@@ -114,47 +115,18 @@ class Session:
         return ("S_FL", self.to_send.pop(0)) if self.to_send else ("T_FD", b"")
 
 
-class TncSimulator:
+class TncSimulator(TcpControl):
     """A control that is running. files: by name. allowed: logins. silent: it takes telegrams and answers none."""
 
     def __init__(self, model: Model) -> None:
-        self.model = model
+        super().__init__(model)
         self.files: dict[str, bytes] = {READINGS: b""}
         self.allowed = {"INSPECT", "FILE"}
         self.silent = False
-        self.port = 0
-        self._server: asyncio.Server | None = None
-        self._writers: set[asyncio.StreamWriter] = set()
-        self._task: asyncio.Task[None] | None = None
         self._printed = 0
         self._answered: set[int] = set()
         self._last = b""
         self._stopped = ""
-
-    async def start(self, port: int) -> None:
-        """Listen; 0 takes a free port."""
-        self._server = await asyncio.start_server(self._serve, "127.0.0.1", port)
-        self.port = self._server.sockets[0].getsockname()[1]
-        self._task = asyncio.create_task(self._work())
-
-    async def stop(self) -> None:
-        """End it."""
-        if self._task is not None:
-            self._task.cancel()
-            await asyncio.gather(self._task, return_exceptions=True)
-        if self._server is not None:
-            self._server.close()
-        self.cut()
-
-    def cut(self) -> None:
-        """The network fails: every connection ends."""
-        for writer in self._writers:
-            writer.transport.abort()
-
-    @property
-    def connections(self) -> int:
-        """Number of connections."""
-        return len(self._writers)
 
     def table(self) -> dict[str, object]:
         """The table of a machine in the configuration."""
@@ -166,26 +138,19 @@ class TncSimulator:
             location=self.model.locations,
         )
 
-    async def _serve(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
-        self._writers.add(writer)
+    async def _talk(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
         session = Session(self)
-        try:
-            while True:
-                head = await reader.readexactly(8)
-                payload = await reader.readexactly(struct.unpack("!L", head[:4])[0])
-                if self.silent:
-                    continue
-                try:
-                    command, content = session.answer(head[4:].decode("ascii"), payload)
-                except Refused as refused:
-                    command, content = "T_ER", bytes((1, refused.code))
-                writer.write(struct.pack("!L", len(content)) + command.encode() + content)
-                await writer.drain()
-        except (OSError, asyncio.IncompleteReadError):
-            pass
-        finally:
-            self._writers.discard(writer)
-            writer.close()
+        while True:
+            head = await reader.readexactly(8)
+            payload = await reader.readexactly(struct.unpack("!L", head[:4])[0])
+            if self.silent:
+                continue
+            try:
+                command, content = session.answer(head[4:].decode("ascii"), payload)
+            except Refused as refused:
+                command, content = "T_ER", bytes((1, refused.code))
+            writer.write(struct.pack("!L", len(content)) + command.encode() + content)
+            await writer.drain()
 
     # --- the NC program's side
 

@@ -5,7 +5,6 @@ stands a target. Errors come with status 404. Times of answers are whole seconds
 """
 
 import asyncio
-import contextlib
 import time
 from datetime import UTC, datetime
 from typing import NamedTuple
@@ -14,6 +13,7 @@ from xml.sax.saxutils import escape
 
 from app.core.ring import Register
 from app.simulators.controls.model import Model
+from app.simulators.controls.tcp_control import TcpControl
 
 BUFFER = 64
 TICK = 0.05  # s
@@ -38,13 +38,12 @@ class Entry(NamedTuple):
     at: datetime
 
 
-class AgentSimulator:
+class AgentSimulator(TcpControl):
     """An agent that is running. answering: while it is cleared, questions stay without an answer. instead: what it answers, whatever is asked."""
 
     def __init__(self, model: Model, buffer: int = BUFFER) -> None:
-        self.model = model
+        super().__init__(model)
         self.buffer = buffer
-        self.port = 0
         self.answering = asyncio.Event()
         self.answering.set()
         self.instead: bytes | None = None
@@ -53,25 +52,11 @@ class AgentSimulator:
         self.next = 1
         self.entries: list[Entry] = []
         self.now: dict[str, Entry] = {}
-        self._server: asyncio.Server | None = None
-        self._writers: dict[asyncio.StreamWriter, asyncio.Task[None] | None] = {}
-        self._watch: asyncio.Task[None] | None = None
 
     async def start(self, port: int) -> None:
         """Listen; 0 takes a free port."""
         self.restart()
-        self._server = await asyncio.start_server(self._serve, "127.0.0.1", port)
-        self.port = self._server.sockets[0].getsockname()[1]
-        self._watch = asyncio.create_task(self._look())
-
-    async def stop(self) -> None:
-        """End it."""
-        tasks = [task for task in (self._watch, *self._writers.values()) if task is not None]
-        if self._server is not None:
-            self._server.close()
-        for task in tasks:
-            task.cancel()
-        await asyncio.gather(*tasks, return_exceptions=True)
+        await super().start(port)
 
     def restart(self) -> None:
         """Begin again: another instance, numbers from 1, nothing known."""
@@ -109,30 +94,24 @@ class AgentSimulator:
             self.observe("tool", str(model.tool_in_spindle))
         self.observe("x", f"{time.monotonic() % 200:.4f}")
 
-    async def _look(self) -> None:
+    async def _work(self) -> None:
         while True:
             self.look()
             await asyncio.sleep(TICK)
 
-    async def _serve(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
-        self._writers[writer] = asyncio.current_task()
-        try:
-            with contextlib.suppress(ConnectionError, asyncio.IncompleteReadError, asyncio.LimitOverrunError):
-                while True:
-                    head = (await reader.readuntil(b"\r\n\r\n")).decode("latin-1")
-                    target = head.split()[1]
-                    self.asked.append(target)
-                    await self.answering.wait()
-                    status, body = self.answer(target)
-                    content = self.instead if self.instead is not None else body.encode()
-                    writer.write(
-                        f"HTTP/1.1 {status}\r\nContent-Type: text/xml\r\nContent-Length: {len(content)}\r\n\r\n".encode()
-                        + content
-                    )
-                    await writer.drain()
-        finally:
-            writer.close()
-            del self._writers[writer]
+    async def _talk(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+        while True:
+            head = (await reader.readuntil(b"\r\n\r\n")).decode("latin-1")
+            target = head.split()[1]
+            self.asked.append(target)
+            await self.answering.wait()
+            status, body = self.answer(target)
+            content = self.instead if self.instead is not None else body.encode()
+            writer.write(
+                f"HTTP/1.1 {status}\r\nContent-Type: text/xml\r\nContent-Length: {len(content)}\r\n\r\n".encode()
+                + content
+            )
+            await writer.drain()
 
     def answer(self, target: str) -> tuple[str, str]:
         """Status and document for a path with its query."""

@@ -269,7 +269,7 @@ def test_each_mistake_is_said() -> None:
                 assert isinstance(error, Misconfigured)
                 assert words in str(error)
             async with collector(simulator.port, "?Q100"), collector(simulator.port, "?Q100"):
-                await until(lambda: len(simulator._clients) == 2, "two collectors")
+                await until(lambda: simulator.connections == 2, "two collectors")
                 assert "It serves two programs at most" in str(await _fails(one))
             simulator.answer = lambda _: ">STATUS, BUSY"  # type: ignore[assignment, method-assign]
             assert "does not answer ?Q100 with a serial number" in str(await _fails(one))
