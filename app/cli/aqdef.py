@@ -8,7 +8,7 @@ from zoneinfo import ZoneInfo
 import typer
 
 from app.cli.base import say
-from app.cli.stored import stored_before, stored_of
+from app.cli.stored import stored_before, stored_of, which
 from app.language.i18n import _, ngettext
 from app.language.times import MINUTES, written
 
@@ -174,8 +174,10 @@ def export_file(
     """Write readings of these characteristics, and say what was made to fit."""
     from app.access.audit import actions as audit
     from app.loop.readings.aqdef.export import write_aqdef
+    from app.loop.readings.exporting import Ends
 
-    done = write_aqdef(session, keys, output, period=period, last=last)
+    ends: dict[str, Ends] = {}
+    done = write_aqdef(session, keys, output, period=period, last=last, ends=ends)
     for key in dict.fromkeys(keys):
         audit.record(
             session,
@@ -186,7 +188,9 @@ def export_file(
         )
     for remark in done.remarks:
         say(remark, style="yellow")
-    say(
-        ngettext("%(num)d reading written to AQDEF.", "%(num)d readings written to AQDEF.", done.values)
-        % {"num": done.values}
-    )
+    text = ngettext("%(num)d reading written to AQDEF", "%(num)d readings written to AQDEF", done.values)
+    of = {key: which(each.numbers, each.span) for key, each in ends.items()}
+    say(f"{text % {'num': done.values}}{next(iter(of.values())) if len(of) == 1 else ''}.")
+    none = _(", no readings")
+    for key, words in of.items() if len(of) > 1 else ():
+        say(f"{key}{words or none}.")

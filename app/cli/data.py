@@ -15,14 +15,12 @@ import typer
 from app.cli import aqdef
 from app.cli.base import DatabaseUrl, DataDir, cli, existing, people, say, settings_from
 from app.cli.context import OfContext, chosen_context
-from app.cli.stored import sentences, stored_before, stored_of
+from app.cli.stored import sentences, stored_before, stored_of, which
 from app.errors import Invalid
 from app.language.i18n import _, ngettext
-from app.language.times import MINUTES, in_zone, plant_zone, written
+from app.language.times import in_zone, plant_zone
 
 if TYPE_CHECKING:
-    from datetime import datetime
-
     from app.core.period import Period
     from app.loop.readings.aqdef.sorting import Wishes as AqdefWishes
     from app.loop.readings.importing.history import Flawed, Summary
@@ -362,7 +360,7 @@ def export_file(
         )
     text = ngettext("%(num)d reading written", "%(num)d readings written", count) % {"num": count}
     with in_zone(zone):
-        say(f"{text}{_which(ends.numbers, ends.span)}.")
+        say(f"{text}{which(ends.numbers, ends.span)}.")
 
 
 def wishes_of(
@@ -436,7 +434,7 @@ def _sum_up(summary: "Summary", characteristic: str, *, live: bool, dry_run: boo
         text = _("{lines} lines can be read").format(lines=summary.lines)
     numbers = None if summary.first_sequence is None else (summary.first_sequence, summary.last_sequence)
     span = (summary.first_at, summary.last_at) if summary.stored and summary.first_at and summary.last_at else None
-    say(f"{begin}{text}{_which(numbers, span)}.", style="bold")
+    say(f"{begin}{text}{which(numbers, span)}.", style="bold")
     for note in summary.notes:
         say(note, style="yellow")
     if summary.repeated:
@@ -449,17 +447,6 @@ def _sum_up(summary: "Summary", characteristic: str, *, live: bool, dry_run: boo
                 corrections=summary.corrections, alarms=summary.alarms
             )
         )
-
-
-def _which(numbers: tuple[int, int | None] | None, span: "tuple[datetime, datetime] | None") -> str:
-    """The first and last of some readings, by number and by time, as a sentence goes on."""
-    text = ""
-    if numbers is not None:
-        text += _(", numbers {first} to {last}").format(first=numbers[0], last=numbers[1])
-    if span is not None:
-        moments = f"{written(span[0], MINUTES)} – {written(span[1], MINUTES)} {plant_zone().key}"
-        text += _(", measured {span}").format(span=moments)
-    return text
 
 
 def _zone(name: str | None) -> ZoneInfo:

@@ -4,8 +4,11 @@ from collections.abc import Iterable, Iterator
 from typing import TYPE_CHECKING
 
 from app.language.i18n import _, ngettext
+from app.language.times import MINUTES, plant_zone, written
 
 if TYPE_CHECKING:
+    from datetime import datetime
+
     from app.loop.readings.importing.cells import Flaw
 
 ALIKE = 3  # lines in a row with the same flaw that are named one by one
@@ -25,6 +28,17 @@ def stored_before(count: int) -> str:
         count,
     )
     return text % {"num": count}
+
+
+def which(numbers: tuple[int, int | None] | None, span: "tuple[datetime, datetime] | None") -> str:
+    """The first and last of some readings, by number and by time, as a sentence goes on."""
+    text = ""
+    if numbers is not None:
+        text += _(", numbers {first} to {last}").format(first=numbers[0], last=numbers[1])
+    if span is not None:
+        moments = f"{written(span[0], MINUTES)} – {written(span[1], MINUTES)} {plant_zone().key}"
+        text += _(", measured {span}").format(span=moments)
+    return text
 
 
 def sentences(flaws: "Iterable[Flaw]") -> Iterator[str]:

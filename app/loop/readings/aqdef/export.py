@@ -49,10 +49,11 @@ OF_THE_READING = {key for key, field in OF_VALUES.items() if field.ours}
 
 
 class _Of(NamedTuple):
-    """A characteristic and its place in the file."""
+    """A characteristic, its place in the file, and its first and last readings there."""
 
     place: int
     current: CurrentCharacteristic
+    ends: exporting.Ends
 
 
 def write_aqdef(
@@ -62,8 +63,11 @@ def write_aqdef(
     *,
     period: Period = ALWAYS,
     last: int | None = None,
+    ends: dict[str, exporting.Ends] | None = None,
 ) -> Outcome:
     """Write the readings of these characteristics. period, last: as `exporting.rows` takes them, for each of them.
+
+    ends: afterwards it has the first and last that were written, by characteristic.
 
     Raises `NotFound` and `Invalid`.
     """
@@ -84,8 +88,13 @@ def write_aqdef(
         gauges=[(names[place][0], f"probe of {names[place][1]}") for place in places],
         process=PROCESS,
     )
+    ends = {} if ends is None else ends
+    ends |= {each.characteristic.key: exporting.Ends() for each in chosen}
     values = merge(
-        *(_values(session, _Of(place, each), period=period, last=last) for place, each in enumerate(chosen)),
+        *(
+            _values(session, _Of(place, each, ends[each.characteristic.key]), period=period, last=last)
+            for place, each in enumerate(chosen)
+        ),
         key=lambda value: value.at,
     )
     return write(path, parts, described, values, catalogues)
@@ -125,7 +134,7 @@ def _values(session: Session, of: _Of, *, period: Period, last: int | None) -> I
     changes = _changes(session, machine.id, parameters.tool_memory)
     offsets = _offsets(session, machine.id, parameters.tool_memory)
     before: datetime | None = None
-    for row in exporting.rows(session, entry, period=period, last=last):
+    for row in of.ends.of(exporting.rows(session, entry, period=period, last=last)):
         at: datetime = row["measured_at"]
         changed = before is not None and any(before < each <= at for each in changes)
         before = at

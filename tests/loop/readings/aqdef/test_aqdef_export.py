@@ -52,6 +52,7 @@ def test_readings_of_several_are_written_with_what_belongs_to_them(plant: Databa
         "export", "--characteristic", keys, "--timezone", "Europe/Berlin", "-o", path, INBAND_DATABASE_URL=plant.dsn
     )
     assert (done.returncode, "6 readings written to AQDEF." in done.stderr) == (0, True), done.stderr
+    assert "shaft-d40, numbers 1 to 4, measured 2026-" in " ".join(done.stderr.split()), "which ones, as of CSV"
     description, found = read(path)
     first, second = description.characteristics.values()
     assert (first.number, second.number, first.fields["K2142"]) == ("shaft-d40", "shaft-d41", "mm")
