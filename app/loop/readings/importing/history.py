@@ -351,18 +351,30 @@ def _count(summary: Summary, row: tuple[Any, ...]) -> None:
 
 
 def _refuse_something_else(summary: Summary, parameters: Parameters) -> None:
-    """Every single value beyond R36 is not a fault of a probe, it is another column, unit or characteristic."""
+    """Refuse a file of which no value can be one: that is no fault of a probe, but another column, unit or characteristic."""
     if summary.zones.get(Zone.PROBE_FAULT.value, 0) < summary.lines:
         return
     line, size = summary.first
+    words = _(
+        "Every value lies more than {limit:g} mm (R36) from the target {target:g} mm, the first one in line {line} with {size:g} mm."
+    )
+    question = _(
+        "Nothing was imported. Is it the right characteristic and the right column? If the values are not in mm, name their unit."
+    )
+    reason = _("no value is near the target")
+    if abs(deviation_of(size, parameters.target, 0.0)) <= parameters.confidence_limit:
+        words = _(
+            "Every value lies beyond the natural limit {target:g} mm, which no part can pass, the first one in line {line} with {size:g} mm."
+        )
+        question = _(
+            "Nothing was imported. Is it the right characteristic, column and sign? A limit that parts can pass is no natural one: "
+            "correct it in the parameters."
+        )
+        reason = _("no value is on this side of the natural limit")
     raise Invalid(
-        _(
-            "Every value lies more than {limit:g} mm (R36) from the target {target:g} mm, the first one in line {line} with {size:g} mm."
-        ).format(limit=parameters.confidence_limit, target=parameters.target, line=line, size=size),
-        _(
-            "Nothing was imported. Is it the right characteristic and the right column? If the values are not in mm, name their unit."
-        ),
-        errors=[FieldError(_("line {line}").format(line=line) + ", measured", _("no value is near the target"))],
+        words.format(limit=parameters.confidence_limit, target=parameters.target, line=line, size=size),
+        question,
+        errors=[FieldError(_("line {line}").format(line=line) + ", measured", reason)],
     )
 
 

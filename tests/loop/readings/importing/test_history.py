@@ -167,6 +167,22 @@ def test_values_in_another_unit_are_noticed(plant: Database, tmp_path: Path) -> 
     assert [r["measured"] for r in stored(plant)] == [39.992, 39.9935]
 
 
+def test_values_beyond_a_natural_limit_are_not_called_far_from_the_target(plant: Database, tmp_path: Path) -> None:
+    """They are probe faults as well, and 0.003 is not more than 1 mm from 0."""
+    limits = {"nominal": 0.0, "upper_deviation": 0.0, "lower_deviation": -0.02, "natural_limit": "upper"}
+    given = CharacteristicIn(
+        key="sink",
+        name="Sink mark",
+        machine="lathe-1",
+        parameters=PARAMETERS | limits | {"tool_memory": 0, "average_memory": 0},
+    )
+    with plant.begin() as session:
+        characteristics.add_characteristic(session, given, "tests")
+    with pytest.raises(Invalid, match=r"beyond the natural limit 0 mm, .* line 2 with 0\.003 mm") as refusal:
+        run(plant, table(tmp_path / "a.csv", [0.003, 0.004]), "sink")
+    assert "R36" not in str(refusal.value)
+
+
 def test_older_readings_are_late_and_the_plant_still_shows_the_newest(plant: Database, tmp_path: Path) -> None:
     run(plant, table(tmp_path / "a.csv", [39.9925], begin="2026-05-01T06:00:00Z"))
     run(plant, table(tmp_path / "b.csv", [39.998, 39.999], begin="2026-03-01T06:00:00Z"))
