@@ -9,6 +9,7 @@
 
 import { ChartPanel } from "./chart-panel.js";
 import { nearest, pixels, pointsOf, pressed } from "./chart-points.js";
+import { margins, place, valueOn } from "./plotly-inside.js";
 
 const element = (name, className, more = {}) => Object.assign(document.createElement(name), { className }, more);
 
@@ -42,7 +43,7 @@ export class ChartCursor {
   listen() {
     const { plot } = this.chart;
     for (const happening of ["plotly_afterplot", "plotly_relayouting"]) plot.on(happening, () => this.place());
-    plot.on("plotly_hover", ({ points }) => points[0]?.x != null && this.tell(this.chart.axis.r2l(points[0].x)));
+    plot.on("plotly_hover", ({ points }) => points[0]?.x != null && this.tell(valueOn(this.chart.axis, points[0].x)));
     plot.on("plotly_unhover", () => this.tell(this.at?.x ?? null));
   }
 
@@ -62,7 +63,7 @@ export class ChartCursor {
   }
 
   seen(x) {
-    const [low, high] = this.chart.axis.range.map((end) => this.chart.axis.r2l(end));
+    const [low, high] = this.chart.axis.range.map((end) => valueOn(this.chart.axis, end));
     return x >= low && x <= high;
   }
 
@@ -83,8 +84,8 @@ export class ChartCursor {
     this.line.hidden = !shown;
     if (!shown) return;
     const { axis } = this.chart;
-    const { t, b } = this.chart.plot._fullLayout._size;
-    Object.assign(this.line.style, { left: `${axis._offset + axis.l2p(x)}px`, top: `${t}px`, height: `${this.chart.plot.clientHeight - t - b}px` });
+    const { t, b } = margins(this.chart.plot);
+    Object.assign(this.line.style, { left: `${place(axis, x)}px`, top: `${t}px`, height: `${this.chart.plot.clientHeight - t - b}px` });
   }
 
   tell(x) {

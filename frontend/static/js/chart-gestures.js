@@ -6,6 +6,8 @@
 //
 // chart has: plot (Plotly's element), axis (its x axis once drawn), view (chart-view.js), cursor, movable, words.
 
+import { edge, extent } from "./plotly-inside.js";
+
 const STEP = 0.7; // of the span, by a key or a button
 const HINTED = "inband-chart-hint";
 const NARROW = 48; // px between two fingers: above one another they only pan
@@ -22,8 +24,7 @@ export const zoomOut = (chart) => chart.view.zoom(1 / STEP, middle(chart));
 
 // The share of the axis at a place of the screen; 0 is its left end.
 function share(chart, clientX) {
-  const { _offset, _length } = chart.axis;
-  return (clientX - chart.plot.getBoundingClientRect().left - _offset) / _length;
+  return (clientX - chart.plot.getBoundingClientRect().left - edge(chart.axis)) / extent(chart.axis);
 }
 
 // Once in a browser: a wheel that scrolls the page over a chart could zoom it.
@@ -45,7 +46,7 @@ function wheel(chart, event) {
   event.preventDefault();
   const pixels = event.deltaMode === WheelEvent.DOM_DELTA_LINE ? 33 : 1;
   if (zooms) chart.view.zoom(Math.exp(Math.max(-60, Math.min(60, event.deltaY * pixels)) * 0.005), Math.min(1, Math.max(0, share(chart, event.clientX))));
-  else chart.view.pan((sideways * pixels) / chart.axis._length);
+  else chart.view.pan((sideways * pixels) / extent(chart.axis));
 }
 
 function touches(chart) {
@@ -67,7 +68,7 @@ function touches(chart) {
     const shares = [...event.touches].map((touch) => share(chart, touch.clientX));
     const apart = shares[1] - shares[0];
     const pinched = (held.values[1] - held.values[0]) / apart; // the span of the whole axis now
-    const span = Math.abs(apart) * chart.axis._length > NARROW && pinched > 0 ? pinched : held.span;
+    const span = Math.abs(apart) * extent(chart.axis) > NARROW && pinched > 0 ? pinched : held.span;
     const low = (held.values[0] + held.values[1]) / 2 - (span * (shares[0] + shares[1])) / 2;
     chart.view.show([low, low + span], { write: false });
   }

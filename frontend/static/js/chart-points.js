@@ -4,6 +4,7 @@
 //   nearest(chart, points, event)   the one under a finger or the mouse; null if none is near
 //   pressed(plot, callback)         a click or a tap that was no drag
 
+import { axisOf, place, valueOn } from "./plotly-inside.js";
 import { here } from "./root.js";
 
 const NEAR = { mouse: 24, pen: 24, touch: 44 }; // px
@@ -12,21 +13,21 @@ const MOVED = 8; // px; a press that moved further was a drag
 const linkOf = (custom) => [custom].flat().slice(0, 1).filter((link) => typeof link === "string" && link.startsWith("/")).map(here)[0];
 
 export function pointsOf({ plot }) {
-  const layout = plot._fullLayout;
+  const across = axisOf(plot, "x");
   return plot.data.flatMap((trace, curve) => {
-    const axis = layout[`yaxis${(trace.yaxis ?? "y").slice(1)}`];
-    if (!axis || !layout.xaxis) return [];
+    const axis = axisOf(plot, trace.yaxis ?? "y");
+    if (!axis || !across) return [];
     return (trace.customdata ?? []).flatMap((custom, number) => {
       const link = linkOf(custom);
       const [x, y] = [trace.x?.[number], trace.y?.[number]];
-      return link && x != null && y != null ? [{ link, kind: trace.meta ?? curve, curve, number, x: layout.xaxis.r2l(x), y: axis.r2l(y), axis }] : [];
+      return link && x != null && y != null ? [{ link, kind: trace.meta ?? curve, curve, number, x: valueOn(across, x), y: valueOn(axis, y), axis }] : [];
     });
   }).sort((one, other) => one.x - other.x);
 }
 
 // Where it stands in the plot.
 export function pixels({ axis }, point) {
-  return [axis._offset + axis.l2p(point.x), point.axis._offset + point.axis.l2p(point.y)];
+  return [place(axis, point.x), place(point.axis, point.y)];
 }
 
 export function nearest(chart, points, event) {

@@ -22,6 +22,7 @@ import { ChartView } from "./chart-view.js";
 import { coalesced } from "./coalesce.js";
 import { courseOf, extentOf, fetchFigure, isMovable, isThinned, withRange } from "./figure.js";
 import { subscribe } from "./live.js";
+import { axisOf, boxIsDrawn, heightDrawn, valueOn } from "./plotly-inside.js";
 import { loadPlotly } from "./plotly-library.js";
 
 const CONFIG = { displayModeBar: false, displaylogo: false, responsive: true, scrollZoom: false, showTips: false };
@@ -56,7 +57,7 @@ class PlotlyChart extends HTMLElement {
 
   fit() { // another width is another figure; drawn for another height, as before the strip came, the strip would cover its axis
     if (Math.abs(this.clientWidth - this.width) > 40) this.refresh();
-    else if (!this.plot.layout.height && Math.abs(this.plot.clientHeight - this.plot._fullLayout.height) > 2) window.Plotly.Plots.resize(this.plot);
+    else if (!this.plot.layout.height && Math.abs(this.plot.clientHeight - heightDrawn(this.plot)) > 2) window.Plotly.Plots.resize(this.plot);
   }
 
   attributeChangedCallback() {
@@ -78,7 +79,7 @@ class PlotlyChart extends HTMLElement {
     gestures(this);
   }
 
-  get axis() { return this.drawn ? this.plot._fullLayout.xaxis : null; }
+  get axis() { return this.drawn ? axisOf(this.plot, "x") : null; }
 
   async load() {
     try {
@@ -91,7 +92,7 @@ class PlotlyChart extends HTMLElement {
       this.finer = this.movable && this.hasAttribute("finer") && isThinned(whole);
       const figure = this.finer && this.view.shown ? await fetchFigure(src, width, this.view.shown) : whole;
       await document.fonts.ready; // letters are measured when drawn
-      while (this.plot._dragging) await new Promise((resolve) => setTimeout(resolve, 100)); // a box that is being drawn
+      while (boxIsDrawn(this.plot)) await new Promise((resolve) => setTimeout(resolve, 100)); // a box that is being drawn
       if (!this.isConnected) return;
       const layout = this.movable ? withRange(figure.layout, this.ends()) : figure.layout;
       await Plotly.react(this.plot, figure.data, { ...layout, dragmode: this.strip.dragmode(layout.dragmode) }, { ...CONFIG, doubleClick: !this.movable && "reset" });
@@ -116,7 +117,7 @@ class PlotlyChart extends HTMLElement {
   listen() {
     this.plot.on("plotly_relayout", (event) => {
       if (!this.movable || !("xaxis.range[0]" in event)) return;
-      this.view.show([event["xaxis.range[0]"], event["xaxis.range[1]"]].map((end) => this.axis.r2l(end)));
+      this.view.show([event["xaxis.range[0]"], event["xaxis.range[1]"]].map((end) => valueOn(this.axis, end)));
     });
     this.plot.on("plotly_doubleclick", () => this.movable && this.view.shown && this.view.show(null));
     scalable(this.plot);
