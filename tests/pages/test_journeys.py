@@ -128,6 +128,25 @@ class TestByTouch:
         expect(page.get_by_role("row").filter(has_text=about)).to_have_count(0)
         assert hands.count == 2
 
+    def test_reject_a_correction_after_a_touch_too_many(self, page: Page, floor: Shop, operator: Person) -> None:
+        """Without a reason nothing is sent: the question stays where it is and says what it lacks."""
+        key = f"{floor.characteristic}-rejected"
+        floor.add(key, tool_memory=13, average_memory=14, mode="approval")
+        number = floor.read(6.0, key)["correction"]["number"]
+        operator.sign_in(page)
+        page.goto("/todo")
+        row = page.get_by_role("row").filter(has_text=f"Seat {key}")
+        row.get_by_role("link", name="Reject", exact=True).tap()
+        dialog = page.get_by_role("dialog")
+        dialog.get_by_role("button", name="Reject").tap()
+        expect(dialog.get_by_text("Pick a reason, or write one.")).to_be_visible()
+        assert floor.correction(number)["status"] == "awaiting_approval"
+        dialog.locator(".chip").filter(has_text="False reading").tap()
+        expect(dialog.get_by_text("Pick a reason, or write one.")).to_be_hidden()
+        dialog.get_by_role("button", name="Reject").tap()
+        expect(page.get_by_role("status").filter(has_text="rejected")).to_be_visible()
+        assert floor.correction(number)["status"] == "rejected"
+
     @pytest.mark.long
     def test_type_in_a_size(self, page: Page, floor: Shop, operator: Person) -> None:
         hands, key = at_the_plant(page, operator), f"{floor.characteristic}-typed"

@@ -3,6 +3,7 @@
 //   data-trouble on the dialog   what it says when the server does not answer
 //   data-close                   what its button to close is called then
 //
+// A dialog whose reason is neither picked nor written is not sent: its [data-unchosen] says so.
 // Without script, or with a page that has no #confirm (signed out, done meanwhile), the link is simply followed.
 // What the page before has done (?done=, ?late=) leaves the address, so that loading it again does not say it again.
 
@@ -41,6 +42,23 @@ document.addEventListener("click", (event) => {
   event.preventDefault();
   if (!asking) ask(link);
 });
+
+dialog?.addEventListener(
+  "submit",
+  (event) => {
+    const form = event.target;
+    const unchosen = form.querySelector("[data-unchosen]");
+    const chips = unchosen?.closest("fieldset");
+    if (!chips || chips.querySelector(":checked") || form.elements.more?.value.trim()) return;
+    event.preventDefault();
+    event.stopImmediatePropagation();
+    unchosen.hidden = false;
+    chips.querySelector("input").focus();
+    chips.scrollIntoView({ block: "nearest" });
+    form.addEventListener("input", () => (unchosen.hidden = true), { once: true });
+  },
+  true,
+);
 
 const here = new URL(location.href);
 if (here.searchParams.has("done") || here.searchParams.has("late")) {
