@@ -100,14 +100,22 @@ def _spaced(
     """
     labels = [""] * len(said)
     for edge in (above, ~above):
-        at = np.flatnonzero(edge)
-        meet = np.where(late[at][1:] == late[at][:-1], close, 2 * close)  # two labels between an early and a late one
-        for group in np.split(at, np.flatnonzero(np.diff(x[at]) > meet) + 1):
-            if group.size:
-                label = said[group[np.argmax(size[group])]]
-                before = bool(late[group].any())
-                late[group[0]] |= before
-                labels[group[0 if before else -1]] = (
-                    f"{label}{NO_BREAK_SPACE}" if before else f"{NO_BREAK_SPACE}{label}"
-                )
+        for group in _groups(np.flatnonzero(edge), x, late, close):
+            label = said[group[np.argmax(size[group])]]
+            before = bool(late[group].any())
+            late[group[0]] |= before
+            labels[group[0 if before else -1]] = f"{label}{NO_BREAK_SPACE}" if before else f"{NO_BREAK_SPACE}{label}"
     return labels
+
+
+def _groups(
+    at: NDArray[np.int64], x: NDArray[np.int64], late: NDArray[np.bool_], close: float
+) -> list[NDArray[np.int64]]:
+    """Those that have one label: near to each other, or two labels would meet, one behind its points and one before its own."""
+    groups: list[NDArray[np.int64]] = []
+    for group in np.split(at, np.flatnonzero(np.diff(x[at]) > close) + 1):
+        while groups and late[group].any() and x[group[0]] - x[groups[-1][-1]] <= 2 * close:
+            group = np.concatenate([groups.pop(), group])  # noqa: PLW2901 - it grows
+        if group.size:
+            groups.append(group)
+    return groups

@@ -31,9 +31,19 @@ SYMBOLS = {1: "triangle-up", 0: "diamond", -1: "triangle-down"}
 
 
 def control_figure(
-    view: View, *, key: str, marked: Marks | None = None, width: int = 1240, picks: bool = False
+    view: View,
+    *,
+    key: str,
+    marked: Marks | None = None,
+    width: int = 1240,
+    inner: int | None = None,
+    picks: bool = False,
 ) -> Chart:
-    """One control chart. picks: dragging chooses a period, and a click a point (see pick-period.js)."""
+    """One control chart.
+
+    inner: pixels between its sides, if they are fewer than its width says. picks: dragging chooses a period, and a click a
+    point (see pick-period.js).
+    """
     if not len(view.points):
         return nothing(_("No points in this period."))
     sides = _sides(view.signals, len(view))
@@ -49,7 +59,7 @@ def control_figure(
         _points(view, view.points, drawn, links, picks=picks),
         *([] if view.below is None else [_points(view, view.below, drawn, links, picks=picks)]),
         *_signals(view, drawn, sides, links),
-        *beyond(view, drawn, [links(at) for at in drawn], low, high, width),
+        *beyond(view, drawn, [links(at) for at in drawn], low, high, inner or width),
         *_names(view, width, high - low),
     ]
     height = Axis(_axis(view), reach=(low, high), format=_format(view.kind, high - low), ticks=7, fixed=picks)

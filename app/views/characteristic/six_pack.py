@@ -4,14 +4,16 @@ from dataclasses import replace
 from datetime import UTC, datetime
 from typing import Any, NamedTuple
 
+import numpy as np
 from fastapi import APIRouter, Request, Response
 from markupsafe import Markup
 from sqlalchemy.orm import Session
 
 from app.access.deps import require
-from app.charts import Axis, Chart, Dots, Mark, Panel, Pen, Room, Rule, Series, nothing, reading_axis, svg, to_drawing
+from app.charts import Axis, Chart, Dots, Mark, Note, Panel, Pen, Room, Rule, Series, Share, nothing, reading_axis, svg, to_drawing
 from app.core.spc.quantity import Quantity
 from app.core.spc.refusal import Refused
+from app.language.formatting import signed
 from app.language.i18n import _
 from app.loop.characteristics import queries as characteristics
 from app.loop.characteristics.queries import CurrentCharacteristic
@@ -34,6 +36,7 @@ from app.web.templates import page
 router = APIRouter(include_in_schema=False, dependencies=[FROM_REPLICA, require("viewer")])
 
 NEWEST = 25  # readings drawn one by one
+TOO_FAR = 3.0  # times as far as the limits: drawn at the edge
 WIDE, HIGH = 430, 262  # pixels of one picture; the page makes it as large as there is room
 RUNS = ("125", "500", "1000", "5000", "all")
 
@@ -127,7 +130,9 @@ def _control(session: Session, current: CurrentCharacteristic, study: Study) -> 
             views.append(charts.unjudged_ranges(views[0]))
         named = [(control_wording.chart_name(view.kind), view) for view in views]
     key = current.characteristic.key
-    return [(name, control_figure(view, key=key, width=620), view.centre is not None) for name, view in named]
+    return [
+        (name, control_figure(view, key=key, width=620, inner=WIDE - 140), view.centre is not None) for name, view in named
+    ]
 
 
 def last_readings(study: Study) -> Chart:
@@ -137,14 +142,16 @@ def last_readings(study: Study) -> Chart:
         return nothing(_("No readings here"))
     limits = [limit * 1000 for limit in (study.limits.lower, study.limits.upper) if limit is not None]
     inside = [all((value >= limit) if limit < 0 else (value <= limit) for limit in limits) for value in values]
-    low, high = min(*limits, 0.0, *values), max(*limits, 0.0, *values)
+    near, furthest = TOO_FAR * max(map(abs, limits)), max(values, key=abs)
+    low, high = (pick(*limits, 0.0, *(value for value in values if abs(value) <= near)) for pick in (min, max))
     edge = 0.06 * (high - low) or 1.0
+    shown = np.clip(values, low - edge / 2, high + edge / 2)
     marks: list[Mark] = [
         Rule(Pen("quiet", 1, "4px,4px"), y=0.0, words=_("target")),
         *(Rule(Pen("ink", 2), y=limit, words=_("lower limit") if limit < 0 else _("upper limit")) for limit in limits),
         Series(
             numbers.tolist(),
-            values.round(4).tolist(),
+            shown.round(4).tolist(),
             Pen("faint", 1.2),
             Dots(
                 size=7,
@@ -153,6 +160,10 @@ def last_readings(study: Study) -> Chart:
             ),
         ),
     ]
+    if abs(furthest) > near:  # it would press the limits into one line; its dot is at the edge, with its value
+        at = int(numbers[np.abs(values).argmax()])
+        words, side = f"{signed(furthest, 0)} µm", "bottom" if furthest > 0 else "top"
+        marks.append(Note(words, at, Share(1 if furthest > 0 else 0), "right", side, (-8, 0), colour="attention"))
     height = Axis(_("Deviation, µm"), reach=(low - edge, high + edge), format="+.4~g", ticks=7)
     ends = (float(numbers[0]) - 0.5, float(numbers[-1]) + 0.5)
     return Chart([Panel(marks, height)], reading_axis(ends, 400), Room(62, 78, 40, 14))

@@ -250,6 +250,15 @@ def test_a_point_beyond_the_other_edge_between_two_neighbours_keeps_them_one_lab
     assert [label.strip() for label in beyond["text"]] == ["−400 µm", "+390 µm", ""]
 
 
+def test_a_label_behind_its_point_does_not_meet_the_one_before_late_points() -> None:
+    """Late points share one label, before the first of them: where one behind earlier points is near, it is theirs too."""
+    values = [0.5, -0.5] * 50
+    for at, value in ((35, -400), (53, -380), (65, -370), (95, -390)):
+        values[at] = value
+    beyond = traces(control_figure(seen(values), key="shaft", width=620, inner=326))["beyond"]
+    assert [label.strip() for label in beyond["text"]] == ["−400 µm", "", "", ""]
+
+
 def test_labels_beyond_do_not_meet_in_a_narrow_chart() -> None:
     values = [0.5, -0.5] * 50
     values[20], values[32] = -400, -380

@@ -38,6 +38,17 @@ def test_without_readings_each_picture_says_so(measured: Shop, viewer: Person) -
     assert "too few readings" in opened
 
 
+def test_one_broken_insert_does_not_press_the_limits_into_a_line(measured: Shop, viewer: Person) -> None:
+    key = measured.another("broken")
+    measured.push([0.5, -0.5] * 12 + [392.6], key)
+    opened = viewer.open(f"/characteristics/{key}/six-pack")
+    last = opened[opened.index("Last 25 readings") :]
+    drawing = last[: last.index("</figure>")]
+    assert "+393 µm" in drawing
+    apart = [float(re.search(rf'y="([\d.]+)"[^>]*>{name} limit', drawing)[1]) for name in ("lower", "upper")]  # type: ignore[index]
+    assert apart[0] - apart[1] > 120, "pixels"
+
+
 @pytest.mark.browser
 def test_it_fits_one_screen_and_one_sheet(measured: Shop, viewer: Person, page: Page) -> None:
     viewer.sign_in(page)
