@@ -104,7 +104,7 @@ class _Paper:
         for mark, laid in marks:
             if isinstance(mark, Rule) and mark.words:
                 self._add(None, self._note(words_of(mark), laid))
-            elif isinstance(mark, Note):
+            elif isinstance(mark, Note) and not self._crowded(mark, laid):
                 self._add(None, self._note(mark, laid))
         self._add(None, self._legend())
         return self.drawing
@@ -211,6 +211,14 @@ class _Paper:
             for row, (text, bold) in enumerate(lines)
             if text
         ]
+
+    def _crowded(self, note: Note, laid: _Laid) -> bool:
+        """Tell if words that may be given up would lie over the words beside them, as chart-details.js does on the page."""
+        if not note.detail or (y := self._at(note.y, laid.y, flat=False)) is None:
+            return False
+        beside = (mark for mark in laid.panel.marks if isinstance(mark, Note) and mark is not note and mark.x == note.x)
+        places = [self._at(mark.y, laid.y, flat=False) for mark in beside if mark.text]
+        return any(place is not None and abs(place - y) < note.size + 1 for place in places)
 
     def _at(self, value: Value | Share, scale: Scale, *, flat: bool) -> float | None:
         if not isinstance(value, Share):

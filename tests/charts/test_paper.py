@@ -1,6 +1,6 @@
 """Charts on paper: what is described is drawn, and the legend shows it."""
 
-from app.charts import PALETTES, Axis, Chart, Dots, Labels, Panel, Pen, Rule, Series, Spread, to_drawing
+from app.charts import PALETTES, Axis, Chart, Dots, Labels, Note, Panel, Pen, Rule, Series, Share, Spread, to_drawing
 from app.charts.marks import Area, Dot, Line, Words
 from app.charts.scales import Scale
 
@@ -44,3 +44,15 @@ def test_a_chart_in_two_panels_is_drawn_with_its_words_and_spreads() -> None:
     assert dots[0] < limit.places[0][1] < dots[1], "6 lies above the rule at 5, and 4 below it"
     upright = [m for m in marks if isinstance(m, Line) and m.width == 1.2 and m.places[0][0] == m.places[1][0]]
     assert len(upright) == 2
+
+
+def test_words_that_are_details_are_given_up_where_they_would_lie_over_others() -> None:
+    notes = [Note("R34", Share(1), 2.0), Note("corrected in full", Share(1), 1.5, detail=True), Note("R33", Share(1), 1.0)]
+    chart = Chart([Panel([Series([1, 2], [0.0, 3.0], Pen("ink")), *notes])])
+
+    def said(height: int) -> set[str]:
+        return {mark.text for group in to_drawing(chart, 400, height).groups for mark in group.marks if isinstance(mark, Words)}
+
+    assert {"R34", "corrected in full", "R33"} <= said(400)
+    assert {"R34", "R33"} <= said(120)
+    assert "corrected in full" not in said(120)
