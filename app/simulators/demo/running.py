@@ -68,6 +68,7 @@ class Line:
         self._gateway = gateway
         self._operator = operator
         self._run = run
+        self._parts = f"{run}-{initials(self.key)}"  # machines count their parts each for itself
         self._rng = rng
         self._ending = ending
         self._causes = causes  # numbers of the catalogue by kind of alarm
@@ -223,7 +224,7 @@ class Line:
             touches=probe.touches or None,
             measured_at=min(moment, datetime.now(UTC)) if past else moment,  # it may take longer than rehearsed
             machined_at=None if past or probe.part.cut_at < self.pace.origin else self.pace.moment(probe.part.cut_at),
-            part=f"{self._run}-{probe.part.serial:04d}",
+            part=f"{self._parts}-{probe.part.serial:04d}",
             key=f"{self._run}:{self.key}:{probe.part.serial}:{probe.feature.key}",
             correction_in_effect=probe.part.in_effect[probe.feature.key],
             context=self.machine.spec.context_of(probe.feature, probe.part.serial, probe.part.temperature),
@@ -336,6 +337,15 @@ class Line:
             self.machine.stand(self.pace.now())
         elif due > 0:
             self._ending.wait(due)
+
+
+def initials(key: str) -> str:
+    """The mark of a machine on its parts.
+
+    >>> initials("lathe-1"), initials("mill-1")
+    ('L1', 'M1')
+    """
+    return "".join(word if word.isdecimal() else word[0] for word in key.split("-") if word).upper()
 
 
 def _all_rejected(alarm: dict[str, Any]) -> bool:

@@ -111,7 +111,7 @@ def _value(ranked: Ranked, by: By) -> Any:
         By.SIGNALS: inputs.signals,
         By.ALARMS: inputs.per_shift,
         By.NAME: row.characteristic.name.casefold(),
-        By.LAST: row.stream.last_received_at,
+        By.LAST: row.stream.last_measured_at,
         By.TREND: _change(ranked.verdict),
     }[by]
 

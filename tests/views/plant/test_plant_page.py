@@ -1,6 +1,7 @@
 """The plant's page: empty, full, live, and never a stale green."""
 
 import re
+from datetime import UTC, datetime, timedelta
 from typing import Any
 
 import pytest
@@ -52,6 +53,15 @@ class TestWithoutScripts:
         assert 'class="band-picture' in text
         assert 'class="sparkline"' in text
         assert f"/characteristics/{shop.characteristic}" in text
+
+    def test_a_reading_is_as_old_as_its_measurement_wherever_it_is_shown(self, shop: Shop, viewer: Person) -> None:
+        """A bridge that was away for some hours delivers late: what it measured then is not from now."""
+        measured = datetime.now(UTC) - timedelta(hours=3)
+        shop.read(1.5, measured_at=measured.isoformat())
+        for path in (f"/plant/{shop.machine}", f"/station/{shop.machine}", f"/characteristics/{shop.characteristic}"):
+            assert f'<time-ago datetime="{measured:%Y-%m-%dT%H:%M}' in viewer.open(path), path
+        row = viewer.open(f"/overview?machine={shop.machine}")
+        assert f'<time-ago datetime="{measured:%Y-%m-%dT%H:%M}' in row
 
     @pytest.mark.parametrize(
         ("deviation", "words"),
