@@ -47,11 +47,20 @@ def test_a_chart_in_two_panels_is_drawn_with_its_words_and_spreads() -> None:
 
 
 def test_words_that_are_details_are_given_up_where_they_would_lie_over_others() -> None:
-    notes = [Note("R34", Share(1), 2.0), Note("corrected in full", Share(1), 1.5, detail=True), Note("R33", Share(1), 1.0)]
+    notes = [
+        Note("R34", Share(1), 2.0),
+        Note("corrected in full", Share(1), 1.5, detail=True),
+        Note("R33", Share(1), 1.0),
+    ]
     chart = Chart([Panel([Series([1, 2], [0.0, 3.0], Pen("ink")), *notes])])
 
     def said(height: int) -> set[str]:
-        return {mark.text for group in to_drawing(chart, 400, height).groups for mark in group.marks if isinstance(mark, Words)}
+        return {
+            mark.text
+            for group in to_drawing(chart, 400, height).groups
+            for mark in group.marks
+            if isinstance(mark, Words)
+        }
 
     assert {"R34", "corrected in full", "R33"} <= said(400)
     assert {"R34", "R33"} <= said(120)

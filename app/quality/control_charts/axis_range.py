@@ -19,7 +19,9 @@ ROOM = 0.08
 TOO_FAR = 4.0  # times as far as limits and most points reach
 WITH_VALUES = 8  # points beyond that are labelled
 CLOSE = 96  # px, the width of a label: of points closer than this the farthest is labelled, behind the last of them
-LATE = 0.12  # of the width of the chart, and room for a label at least: nearer to its right edge the label is before the points
+LATE = (
+    0.12  # of the width of the chart, and room for a label at least: nearer to its right edge none is behind its points
+)
 MOST = 0.04  # of the points on either side may lie beyond: a broken insert is seen on a few parts before it is changed
 FEW = 8  # points of which none is far
 UNSIGNED = (Chart.MOVING_RANGE, Chart.RANGES, Chart.DEVIATIONS)
@@ -64,9 +66,11 @@ def beyond(
     said = [f"{value:.0f} µm" if view.kind in UNSIGNED else f"{signed(value, 0)} µm" for value in values[far].tolist()]
     x = view.last[drawn[far]]
     wide = view.last[-1] - view.first[0]
-    late = x > view.last[-1] - max(LATE, CLOSE / width) * wide
-    texts = _spaced(said, np.abs(values[far]), x, above, late, CLOSE / width * wide)
-    beside = np.where(late, "middle left", "middle right").tolist()
+    ends = int(view.first[0]), view.last[-1] - max(0.0, LATE - CLOSE / width) * wide
+    texts, before = [""] * len(said), np.zeros(len(said), dtype=np.bool_)
+    for edge in (above, ~above):
+        _label(texts, before, said, np.abs(values[far]), x, np.flatnonzero(edge), CLOSE / width * wide, ends)
+    beside = np.where(before, "middle left", "middle right").tolist()
     return [
         Series(
             x.tolist(),
@@ -86,36 +90,32 @@ def beyond(
     ]
 
 
-def _spaced(
+def _label(
+    texts: list[str],
+    before: NDArray[np.bool_],
     said: list[str],
     size: NDArray[np.float64],
     x: NDArray[np.int64],
-    above: NDArray[np.bool_],
-    late: NDArray[np.bool_],
+    at: NDArray[np.int64],
     close: float,
-) -> list[str]:
-    """The labels of points that lie too close to each other on one edge become one, of the one that is farthest out.
+    ends: tuple[float, float],
+) -> None:
+    """Label the points of one edge: those too close to each other share one, of the one that is farthest out.
 
-    It stands behind the last, before the first where one of them is late: `late` is set for that one.
+    It stands behind the last of them where there is room, else before the first, else nowhere: the farthest choose first.
+    close: the width of a label; ends: between which labels may lie.
     """
-    labels = [""] * len(said)
-    for edge in (above, ~above):
-        for group in _groups(np.flatnonzero(edge), x, late, close):
-            label = said[group[np.argmax(size[group])]]
-            before = bool(late[group].any())
-            late[group[0]] |= before
-            labels[group[0 if before else -1]] = f"{label}{NO_BREAK_SPACE}" if before else f"{NO_BREAK_SPACE}{label}"
-    return labels
-
-
-def _groups(
-    at: NDArray[np.int64], x: NDArray[np.int64], late: NDArray[np.bool_], close: float
-) -> list[NDArray[np.int64]]:
-    """Those that have one label: near to each other, or two labels would meet, one behind its points and one before its own."""
-    groups: list[NDArray[np.int64]] = []
-    for group in np.split(at, np.flatnonzero(np.diff(x[at]) > close) + 1):
-        while groups and late[group].any() and x[group[0]] - x[groups[-1][-1]] <= 2 * close:
-            group = np.concatenate([groups.pop(), group])  # noqa: PLW2901 - it grows
-        if group.size:
-            groups.append(group)
-    return groups
+    groups = [group for group in np.split(at, np.flatnonzero(np.diff(x[at]) > close) + 1) if group.size]
+    starts, stops = [x[group[0]] for group in groups], [x[group[-1]] for group in groups]
+    room = [
+        start - stop for start, stop in zip([*starts, ends[1]], [ends[0], *stops], strict=True)
+    ]  # before each, and at the end
+    for n in sorted(range(len(groups)), key=lambda n: -size[groups[n]].max()):
+        group = groups[n]
+        label = said[group[np.argmax(size[group])]]
+        if room[n + 1] >= close:
+            room[n + 1] -= close
+            texts[group[-1]] = f"{NO_BREAK_SPACE}{label}"
+        elif room[n] >= close or len(groups) == 1:
+            room[n] -= close
+            texts[group[0]], before[group[0]] = f"{label}{NO_BREAK_SPACE}", True

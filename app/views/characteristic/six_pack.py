@@ -10,7 +10,23 @@ from markupsafe import Markup
 from sqlalchemy.orm import Session
 
 from app.access.deps import require
-from app.charts import Axis, Chart, Dots, Mark, Note, Panel, Pen, Room, Rule, Series, Share, nothing, reading_axis, svg, to_drawing
+from app.charts import (
+    Axis,
+    Chart,
+    Dots,
+    Mark,
+    Note,
+    Panel,
+    Pen,
+    Room,
+    Rule,
+    Series,
+    Share,
+    nothing,
+    reading_axis,
+    svg,
+    to_drawing,
+)
 from app.core.spc.quantity import Quantity
 from app.core.spc.refusal import Refused
 from app.language.formatting import signed
@@ -131,7 +147,8 @@ def _control(session: Session, current: CurrentCharacteristic, study: Study) -> 
         named = [(control_wording.chart_name(view.kind), view) for view in views]
     key = current.characteristic.key
     return [
-        (name, control_figure(view, key=key, width=620, inner=WIDE - 140), view.centre is not None) for name, view in named
+        (name, control_figure(view, key=key, width=620, inner=WIDE - 140), view.centre is not None)
+        for name, view in named
     ]
 
 
