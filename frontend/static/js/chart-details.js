@@ -2,7 +2,7 @@
 
 import { axisOf, notes, pixelOn } from "./plotly-inside.js";
 
-const LEAST = 12; // px from line to line
+const LEAST = 14; // px from line to line
 
 export function withoutCrowded(plot) {
   const giveUp = () => {

@@ -182,6 +182,13 @@ class TestDeciding:
         assert "is in effect" in engineer.send(f"{machine(shop)}/backups/3", 409, reason="x")
         engineer.open(f"{machine(shop)}/backups/99", 404)
 
+    def test_values_to_enter_are_cards_on_a_phone(self, shop: Shop, operator: Person) -> None:
+        """Each says its column: nothing that is entered at the control lies beyond the edge of the screen."""
+        run = take(shop, results={"QS146": QS})
+        shown = operator.open(f"/kinematics/runs/{run}")
+        table = shown[shown.index('<table class="table enter as-cards"') :]
+        assert re.search(r'<td class="num enter-value" data-label="To enter">', table)
+
     def test_a_refused_run_says_why_and_asks_for_nothing(self, shop: Shop, operator: Person) -> None:
         shop.call("PUT", f"/machines/{shop.machine}/kinematics", ball_radius=RADIUS, max_dev_cal_ball=0.01, reason="x")
         run = take(shop, axes=[touched(radius=RADIUS + 0.02)])
