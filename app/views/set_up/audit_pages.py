@@ -14,6 +14,7 @@ from app.access.deps import Engineer
 from app.core.parameters import BY_NAME, Field, FieldKind
 from app.language.formatting import as_read
 from app.language.i18n import _
+from app.loop.alarm_response.wording import action_word
 from app.loop.characteristics.wording import choice, label
 from app.views.set_up.frame import setup_page
 from app.web.deps import SessionDep
@@ -124,6 +125,8 @@ def changes(
 
     >>> changes({"parameters": {"zero_range": 0.001}}, {"parameters": {"zero_range": 0.002}}, of_parameters=True)
     [('Zero range (R33)', '0.001 mm', '0.002 mm')]
+    >>> changes({}, {"action": "tool_replaced"})
+    [('action', '–', 'Tool changed')]
     """
     old, new = _flat(before or {}), _flat(after or {})
     found = []
@@ -132,11 +135,16 @@ def changes(
             field = BY_NAME.get(path.rpartition(".")[2]) if of_parameters else None
             was, is_now = (_said(side[path], field) if path in side else "–" for side in (old, new))
             if path in CODES:
-                was, is_now = was.replace("_", " "), is_now.replace("_", " ")
+                was, is_now = _code_words(path, was), _code_words(path, is_now)
             elif path in LENGTHS:
                 was, is_now = (f"{said} mm" if said != "–" else said for said in (was, is_now))
             found.append((_named(path, field), was, is_now))
     return found
+
+
+def _code_words(path: str, code: str) -> str:
+    """A code in words; what was done about an alarm as it is on its button."""
+    return (action_word(code) if path == "action" else code).replace("_", " ")
 
 
 def _named(path: str, field: Field | None) -> str:
