@@ -38,7 +38,6 @@ from app.quality.capability.kinds import Week
 MOST_BARS, FEWEST_BARS = 60, 8
 CURVE = 161  # points of a drawn curve
 MOST_POINTS, TAIL = 600, 40  # of the probability plot, and of each of its ends that are drawn whichever
-BELOW = Share(-0.2)
 MOST_CHANGES = 60  # lines of tool changes; more are a fence
 SHARES = (0.00135, 0.01, 0.05, 0.25, 0.5, 0.75, 0.95, 0.99, 0.99865)
 
@@ -98,7 +97,7 @@ def histogram(drawn: CapabilityChart) -> Chart:
                 ]
                 marks.append(Series((at * 1000).tolist(), height, Pen("correction", 2, dash), meta=dash, name=name))
     return _chart(
-        [*marks, *_limit_lines(drawn, low, high), *_beyond(drawn)],
+        [*marks, *_limit_lines(drawn, low, high), *_beyond(drawn, top=True)],
         low,
         high,
         Axis(_("Readings"), from_zero=True, ticks=5),
@@ -138,19 +137,20 @@ def probability(drawn: CapabilityChart) -> Chart:
         at=[float(ndtri(share)) for share in SHARES],
         words=[f"{share * 100:g} %" for share in SHARES],
     )
-    return _chart([*marks, *_limit_lines(drawn, low, high, percentiles=False), *_beyond(drawn)], low, high, shares)
+    return _chart(
+        [*marks, *_limit_lines(drawn, low, high, percentiles=False), *_beyond(drawn, top=False)], low, high, shares
+    )
 
 
 def small(chart: Chart) -> Chart:
-    """The same without a legend, for which there is no room; readings beyond are named in place of the axis below."""
+    """The same without a legend, for which there is no room."""
     panels = [
         replace(
             panel, marks=[replace(mark, name="") if isinstance(mark, Series | Bars) else mark for mark in panel.marks]
         )
         for panel in chart.panels
     ]
-    beyond = any(isinstance(mark, Note) and mark.y == BELOW for panel in panels for mark in panel.marks)
-    return replace(chart, panels=panels, x=replace(chart.x, title="") if beyond else chart.x, room=Room(78, 22, 54, 40))
+    return replace(chart, panels=panels, room=Room(78, 22, 54, 40))
 
 
 def _near(drawn: CapabilityChart) -> Floats:
@@ -158,8 +158,8 @@ def _near(drawn: CapabilityChart) -> Floats:
     return np.asarray(drawn.values[~far_off(drawn.values)])
 
 
-def _beyond(drawn: CapabilityChart) -> list[Note]:
-    """Note below the picture: the number of readings outside it."""
+def _beyond(drawn: CapabilityChart, *, top: bool) -> list[Note]:
+    """Note at the right, where the picture is empty: the number of readings outside it."""
     far, middle = drawn.values[far_off(drawn.values)], float(np.median(drawn.values))
     words = []
     for left, values in ((True, far[far < middle]), (False, far[far > middle])):
@@ -170,8 +170,12 @@ def _beyond(drawn: CapabilityChart) -> list[Note]:
             )
             text %= {"num": len(values), "at": signed(furthest, 1)}
             words.append(f"◂ {text}" if left else f"{text} ▸")
-    where = Share(1), BELOW
-    return [Note("  ".join(words), *where, "right", "top", size=13, colour="attention")] if words else []
+    if not words:
+        return []
+    where = Share(1), Share(0.98 if top else 0.02, inside=True)
+    return [
+        Note("  ".join(words), *where, "right", "top" if top else "bottom", size=13, colour="attention", ground=True)
+    ]
 
 
 def edges_of(values: Floats) -> Floats:
