@@ -2,7 +2,7 @@
 
 from dataclasses import replace
 from datetime import UTC, datetime
-from typing import Any, NamedTuple
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 from fastapi import APIRouter, Request, Response
@@ -179,8 +179,10 @@ def last_readings(study: Study) -> Chart:
     ]
     if abs(furthest) > near:  # it would press the limits into one line; its dot is at the edge, with its value
         at = int(numbers[np.abs(values).argmax()])
-        words, side = f"{signed(furthest, 0)} µm", "bottom" if furthest > 0 else "top"
-        marks.append(Note(words, at, Share(1 if furthest > 0 else 0), "right", side, (-8, 0), colour="attention"))
+        over = furthest > 0
+        place = Share(1 if over else 0)
+        side: Literal["top", "bottom"] = "bottom" if over else "top"
+        marks.append(Note(f"{signed(furthest, 0)} µm", at, place, "right", side, (-8, 0), colour="attention"))
     height = Axis(_("Deviation, µm"), reach=(low - edge, high + edge), format="+.4~g", ticks=7)
     ends = (float(numbers[0]) - 0.5, float(numbers[-1]) + 0.5)
     return Chart([Panel(marks, height)], reading_axis(ends, 400), Room(62, 78, 40, 14))
