@@ -82,7 +82,7 @@ class Plant(Collector):
         )
         corrections = GaugeMetricFamily("inband_corrections", "Corrections by status.", labels=["machine", "status"])
         alarms = GaugeMetricFamily(
-            "inband_active_alarms", "Alarms nobody has acknowledged.", labels=["machine", "kind"]
+            "inband_active_alarms", "Alarms that are not acknowledged.", labels=["machine", "kind"]
         )
         with self._database.begin() as session:
             for machine, count, at in session.execute(text(_READINGS)):
