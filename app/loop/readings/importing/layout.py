@@ -149,7 +149,9 @@ class Layout:
 
     @property
     def on_times(self) -> str:
-        """A sentence on times that are there under another name, or nowhere. Empty where a name or a person says them."""
+        """A sentence on times that are there under another name, or nowhere. Empty where a name or a person says them, or is asked."""
+        if "measured_at" in dict(self.questions):
+            return ""
         return on_times(self.named("measured_at"), self.days, taken=self.takes_times)
 
     def of_one(self, key: str, name: str) -> "Layout":

@@ -175,6 +175,7 @@ def test_the_form_of_the_preview_chooses_no_days(plant: Plant, tmp_path: Path) -
     shown = plant.engineer.browser.post("/import", data=data, files={"file": ("a.csv", path.read_bytes())}).text
     form = dict(re.findall(r'<input type="hidden" name="(column_\w+)" value="([^"]*)"', shown))
     assert form["column_measured_at"] == "?"
+    assert "every reading gets" not in shown, "nothing is said of what a person is asked"
     assert OF_DAYS in plant.page(path, key, **form)
 
 
