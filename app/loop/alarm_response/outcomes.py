@@ -1,6 +1,6 @@
 """Consequences of an acknowledgement, in sentences."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 from app.language.formatting import mm, read_um
@@ -32,82 +32,76 @@ def found_by_hand(measured: float | None, good: bool | None) -> str:
     return ", ".join([*([mm(measured)] if measured is not None else []), *verdict])
 
 
+_SENTENCES: Mapping[str, Callable[[int], str]] = {
+    "tool_restarted": lambda n: ngettext(
+        "Tool {tool} starts a new life with offset {offset}; the old one cut {parts} part.",
+        "Tool {tool} starts a new life with offset {offset}; the old one cut {parts} parts.",
+        n,
+    ),
+    "offset_assumed": lambda _n: _("No offset was entered; {offset} is assumed."),
+    "offset_far": lambda _n: _("It was {before}, and is {offset} now. Offsets are typed in mm: is it µm, or inches?"),
+    "tool_changed_already": lambda _n: _("Tool {tool} had been changed since, so nothing was restarted a second time."),
+    "corrections_superseded": lambda n: ngettext(
+        "Correction {numbers} was dropped.", "Corrections {numbers} were dropped.", n
+    ),
+    "averages_restarted": lambda n: ngettext(
+        "The running average R11 = {locations} begins at 0.",
+        "The running averages R11 = {locations} begin at 0.",
+        n,
+    ),
+    "correction_released": lambda _n: _("Correction {number} of {amount} was released to the machine."),
+    "measured_by_hand": lambda _n: _("Reading {sequence} was measured by hand: {found}."),
+    "nothing_held": lambda _n: _("No correction was held any more."),
+    "still_held": lambda _n: _("Correction {number} is still held."),
+    "readings_excluded": lambda n: ngettext(
+        "Reading {sequences} of {characteristic} was excluded.",
+        "Readings {sequences} of {characteristic} were excluded.",
+        n,
+    ),
+    "readings_excluded_before": lambda n: ngettext(
+        "Reading {sequences} of {characteristic} had been excluded before.",
+        "Readings {sequences} of {characteristic} had been excluded before.",
+        n,
+    ),
+    "correction_withdrawn": lambda _n: _("Correction {number} of {amount} was withdrawn."),
+    "correction_applied": lambda _n: _(
+        "Correction {number} of {amount} is in the offset already; the next readings correct it."
+    ),
+    "switched": lambda _n: _("Tool {sister} goes on for tool {tool}; corrected by {characteristics}."),
+    "switched_already": lambda _n: _(
+        "Tool {sister} had taken over from tool {tool} already, so nothing was switched a second time."
+    ),
+    "offset_set": lambda _n: _("The offset of tool {tool} is {offset}."),
+    "offset_told_already": lambda _n: _("The offset of tool {tool} had been set by hand since, to {offset}."),
+    "level_followed": lambda _n: _("The next readings are expected where the jump has led."),
+    "level_disagrees": lambda _n: _(
+        "Readings since then lie where they were expected before the jump, so nothing of it is corrected."
+    ),
+    "readings_disagree": lambda _n: _(
+        "Readings since then lie within the wear limit R37, so nothing of it is corrected."
+    ),
+    "tool_resumed": lambda _n: _("Compensation through tool {tool} goes on."),
+    "resumed": lambda _n: _("Compensation of {characteristic} goes on."),
+}
+"""By code, from the number of parts, corrections, readings or averages that the sentence is about. A kind of alarm may have others."""
+
+
 def _followed(item: dict[str, Any], half: float | None) -> str:
+    code, listed = item["code"], {name: item.get(name, ()) for name in ("numbers", "sequences", "locations")}
     values = {
         **item,
+        **{name: numbers(each) for name, each in listed.items()},
         "offset": mm(item.get("offset")),
         "amount": read_um(item.get("amount"), half),
-        "numbers": numbers(item.get("numbers", ())),
-        "sequences": numbers(item.get("sequences", ())),
-        "locations": numbers(item.get("locations", ())),
         "characteristics": ", ".join(item.get("characteristics", ())),
     }
-    count = len(item.get("numbers", ())) or len(item.get("sequences", ())) or len(item.get("locations", ()))
-    match item["code"]:
-        case "tool_restarted":
-            text = ngettext(
-                "Tool {tool} starts a new life with offset {offset}; the old one cut {parts} part.",
-                "Tool {tool} starts a new life with offset {offset}; the old one cut {parts} parts.",
-                item["parts"],
-            )
-        case "offset_assumed":
-            text = _("No offset was entered; {offset} is assumed.")
-        case "offset_far":
-            text = _("It was {before}, and is {offset} now. Offsets are typed in mm: is it µm, or inches?")
-            values["before"] = mm(item["before"])
-        case "tool_changed_already":
-            text = _("Tool {tool} had been changed since, so nothing was restarted a second time.")
-        case "corrections_superseded":
-            text = ngettext("Correction {numbers} was dropped.", "Corrections {numbers} were dropped.", count)
-        case "averages_restarted":
-            text = ngettext(
-                "The running average R11 = {locations} begins at 0.",
-                "The running averages R11 = {locations} begin at 0.",
-                count,
-            )
-        case "correction_released":
-            text = _("Correction {number} of {amount} was released to the machine.")
-        case "measured_by_hand":
-            text = _("Reading {sequence} was measured by hand: {found}.")
-            values["found"] = found_by_hand(item.get("measured"), item.get("good"))
-        case "nothing_held":
-            text = _("No correction was held any more.")
-        case "still_held":
-            text = _("Correction {number} is still held.")
-        case "readings_excluded":
-            text = ngettext(
-                "Reading {sequences} of {characteristic} was excluded.",
-                "Readings {sequences} of {characteristic} were excluded.",
-                count,
-            )
-        case "readings_excluded_before":
-            text = ngettext(
-                "Reading {sequences} of {characteristic} had been excluded before.",
-                "Readings {sequences} of {characteristic} had been excluded before.",
-                count,
-            )
-        case "correction_withdrawn":
-            text = _("Correction {number} of {amount} was withdrawn.")
-        case "correction_applied":
-            text = _("Correction {number} of {amount} is in the offset already; the next readings correct it.")
-        case "switched":
-            text = _("Tool {sister} goes on for tool {tool}; corrected by {characteristics}.")
-        case "switched_already":
-            text = _("Tool {sister} had taken over from tool {tool} already, so nothing was switched a second time.")
-        case "offset_set":
-            text = _("The offset of tool {tool} is {offset}.")
-        case "offset_told_already":
-            text = _("The offset of tool {tool} had been set by hand since, to {offset}.")
-        case "level_followed":
-            text = _("The next readings are expected where the jump has led.")
-        case "level_disagrees":
-            text = _("Readings since then lie where they were expected before the jump, so nothing of it is corrected.")
-        case "readings_disagree":
-            text = _("Readings since then lie within the wear limit R37, so nothing of it is corrected.")
-        case "tool_resumed":
-            text = _("Compensation through tool {tool} goes on.")
-        case "resumed":
-            text = _("Compensation of {characteristic} goes on.")
-        case code:
-            return next((kind.outcomes[code](item) for kind in kinds() if code in kind.outcomes), str(code))
+    if code == "offset_far":
+        values["before"] = mm(item["before"])
+    if code == "measured_by_hand":
+        values["found"] = found_by_hand(item.get("measured"), item.get("good"))
+    count = item["parts"] if code == "tool_restarted" else max(map(len, listed.values()))
+    if code in _SENTENCES:
+        text = _SENTENCES[code](count)
+    else:
+        text = next((kind.outcomes[code](item) for kind in kinds() if code in kind.outcomes), str(code))
     return text.format(**values)
