@@ -18,7 +18,7 @@ from app.files.formats.number_with_unit import number_and_unit
 from app.files.formats.units import LENGTHS, UnknownUnit, length_unit, unit_above
 from app.language.i18n import _
 from app.loop.readings.importing.columns import DRAWN, by_places, columns_of, fits, guesses_of, nominal_of
-from app.loop.readings.importing.named_times import counted_in_doubt, on_times, times_in_doubt
+from app.loop.readings.importing.named_times import in_doubt, on_times
 from app.loop.readings.importing.refusals import (
     LONGEST_NAME,
     heading_or_reading,
@@ -366,15 +366,13 @@ def _with_unnamed(layout: Layout, wishes: Wishes, rows: Sequence[Sequence[Any]])
     layout = replace(layout, days=layout.named("measured_at"))
     free = [place for place in layout.ignored_places if place not in layout.nominal]
     columns = {str(at): [written(row[at]) if at < len(row) else "" for row in rows] for at in free}
-    sure, doubtful, counted = times_unnamed(columns, wishes.time_format, days if named else ())
-    if sure:
-        return replace(layout, columns={**layout.columns, "measured_at": (int(sure),)}, takes_times=True)
-    names = ", ".join(layout.header[int(at)] or str(int(at) + 1) for at in (*doubtful, *counted))
-    if counted:
-        question = counted_in_doubt(names, columns[next(iter(counted))][0], next(iter(counted.values())))
-    elif doubtful:
-        question = times_in_doubt(names, layout.days)
-    return replace(layout, questions=(*layout.questions, ("measured_at", question))) if names else layout
+    found = times_unnamed(columns, wishes.time_format, days if named else ())
+    if found.sure:
+        return replace(layout, columns={**layout.columns, "measured_at": (int(found.sure),)}, takes_times=True)
+    if not (question := in_doubt(found, columns, layout.header, layout.days)):
+        return layout
+    others = {name: places for name, places in layout.columns.items() if name != "measured_at"}
+    return replace(layout, columns=others, questions=(*layout.questions, ("measured_at", question)))
 
 
 def _times(layout: Layout, begin: Sequence[Row], rest: Iterator[Row]) -> FileTimes:

@@ -1,5 +1,8 @@
 """Sentences on the column of times of a file: taken under a name that is not known, missing, or asked about."""
 
+from collections.abc import Mapping, Sequence
+
+from app.files.formats.file_times import Unnamed
 from app.language.i18n import _
 
 
@@ -30,8 +33,17 @@ def on_times(column: str, days: str, *, taken: bool) -> str:
     return words.format(column=column, days=days)
 
 
-def times_in_doubt(columns: str, days: str) -> str:
-    """The question which of these columns of dates holds the times. days: the column of days that has a name for them, if there is one."""
+def in_doubt(found: Unnamed, columns: Mapping[str, Sequence[str]], header: Sequence[str], days: str) -> str:
+    """The question which column holds the times; empty where none may. columns: by their places in the header. days: as `on_times`."""
+    names = ", ".join(header[int(at)] or str(int(at) + 1) for at in (*found.doubtful, *found.counted))
+    if found.counted:
+        place, form = next(iter(found.counted.items()))
+        words = _(
+            "The numbers under {columns} ({number} is the first) may be times, and no column has a known name for the time of measuring. If "
+            "they are, say so (measured_at=COLUMN{form}); if not, that none is (measured_at=): then every reading gets the time of the import."
+        )
+        said = _(" with the form of times “{form}”, --time-format").format(form=form) if form else ""
+        return words.format(columns=names, number=columns[place][0], form=said)
     words = _(
         "Dates stand under {columns}, and no column has a known name for the time of measuring. Say which it is (measured_at=COLUMN), or "
         "that none is (measured_at=); then every reading gets the time of the import."
@@ -41,14 +53,4 @@ def times_in_doubt(columns: str, days: str) -> str:
             "{days} holds days without a time of day, and dates with one stand under {columns}. Say which is the time of measuring: "
             "measured_at=COLUMN, or measured_at={days} for the midnight at the beginning of each day."
         )
-    return words.format(columns=columns, days=days)
-
-
-def counted_in_doubt(columns: str, number: str, form: str) -> str:
-    """The question if these columns of numbers hold the times. number: the first. form: that reads them as times, if they need one."""
-    words = _(
-        "The numbers under {columns} ({number} is the first) may be times, and no column has a known name for the time of measuring. If "
-        "they are, say so (measured_at=COLUMN{form}); if not, that none is (measured_at=): then every reading gets the time of the import."
-    )
-    said = _(" with the form of times “{form}”, --time-format").format(form=form) if form else ""
-    return words.format(columns=columns, number=number, form=said)
+    return words.format(columns=names, days=days) if names else ""

@@ -329,7 +329,7 @@ def _fields(layout: Layout, chosen: Mapping[str, str], *, wide: bool = False) ->
         value = "+".join(str(place + 1) for place in places)
         pair = [(value, layout.named(name))] if len(places) > 1 else []
         none, free = [("", "–")], columns
-        if name not in chosen and (not value or name in dict(layout.questions)):
+        if not value and name not in chosen:
             value = AUTOMATIC
             none = [(AUTOMATIC, "–"), *([("", _("none"))] if name in dict(layout.questions) else [])]
         elif layout.takes_times and name == "measured_at":
