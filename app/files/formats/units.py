@@ -31,15 +31,18 @@ _WORDS: Final[dict[str, str]] = {
     word: unit
     for unit, words in {
         "mm": "mm millimeter millimeters millimetern millimetre millimetres millimetri milimetar milimetara milimetri milimetrih "
+        "milímetro milímetros milimetro milimetros milimetry milimetrů milimetrów milimetre millimètre millimètres "
         "мм миллиметр миллиметры миллиметрах милиметар 毫米 ミリ",
         "um": "µm um mikrometer mikrometern micrometer micrometers micrometre micrometres micron microns mikron mikrona mikroni mikronen "
-        "mikronima mikronih mikrometar mikrometara mikrometri mikrometrov mikrometrih micromètre micromètres mkm мкм микрон микроны "
-        "микронах микрона микронима микрометр микрометры микрометрах 微米",
+        "mikronima mikronih mikrony mikronů mikronów mikrón mícron mícrons micrones micra micras mikra mikrometar mikrometara mikrometri "
+        "mikrometrov mikrometrih mikrometrů mikrometrów mikrometre micromètre micromètres micrometro micrometri micrómetro micrómetros "
+        "mkm мкм микрон микроны микронах микрона микронима микрометр микрометры микрометрах 微米 ミクロン マイクロメートル",
         "nm": "nm nanometer nanometre",
         "cm": "cm centimeter centimetre zentimeter см",
         "m": "m meter metre м",
-        "inch": "in in. ins inch inches zoll inč inča inči inčima pouce pouces pollice pollici pulgada pulgadas pulg дюйм дюйма дюймы дюймов "
-        "дюймах инч инча инчи инчима 英寸 インチ \" '' ″ ”",
+        "inch": "in in. ins inch inches zoll inč inča inči inčima pouce pouces pollice pollici pulgada pulgadas pulg polegada polegadas "
+        "tomme tommer tuuma tuumaa tuumat hüvelyk palce palců cale inç дюйм дюйма дюймы дюймов дюймах инч инча инчи инчима 英寸 インチ "
+        "\" '' ″ ”",
         "mil": "mil mils thou thous thou. milliinch",
         "tenth": "tenth tenths",
         "uin": "µin uin µinch uinch microinch microinches",
@@ -57,12 +60,13 @@ LONGEST_SIZE: Final = 400  # characters; what is longer is not a size
 _LAST_WORD: Final = re.compile(r"[_ ]([^_ ]+)$")
 _OTHER_SCALES: Final = {"f", "fahrenheit", "k", "kelvin", "r", "rankine", "℉"}
 _WORDS_OF: Final = re.compile(r"[^\W\d_]+")
+_GAUGES: Final = frozenset(["micrometer", "mikrometer", "micrometro", "micrómetro"])
 _UNMISTAKABLE: Final = frozenset(
     ["mm", "µm", "мм", "мкм", "毫米", "微米", "英寸", "インチ"]
     + [
         word
         for word, unit in _WORDS.items()
-        if len(word) > 3 and unit in {"mm", "um", "inch", "mil", "uin"} and word not in {"micrometer", "mikrometer"}
+        if len(word) > 3 and unit in {"mm", "um", "inch", "mil", "uin"} and word not in _GAUGES
     ]
 )
 """Words that mean a unit wherever they stand in a name; a micrometer is a gauge as well. Others do at its end only: *um* is a German word, *in* an English one."""
@@ -81,7 +85,8 @@ _LENGTH: Final = r"""(?:mm|[uµμ]m|inch(?:es)?|in|zoll|["″])"""
 _PART: Final = rf"""1\s*/\s*10+\s*{_LENGTH}(?!\w)|[\[(]\s*1\s*/\s*10+\s*[\])]|\b{_LENGTH}\s*(?:/|\*|x|×|·)\s*10+\b
 |\b1?e-\d+\s*{_LENGTH}(?!\w)|\b{_LENGTH}\s*e-\d|\b10+\s*ths?\b
 |\b(?:ten|hundredths?)[- ]?thou(?:sandths?)?s?\b|\btenths?\s+(?:of\s+)?(?:an?\s+)?(?:mm|thou|mil|micron|inch)
-|\b(?:thousandths?|hundredths?|tausendstel|hundertstel|zehntel|hiljadit\w+|stotink\w+|tisočink\w+|тысячн\w+|[mc]illièmes?|centièmes?|dixièmes?)\b"""
+|\b(?:thousandths?|hundredths?|tausendstel|hundertstel|zehntel|hiljadit\w+|stotink\w+|tisočink\w+|desetink\w+|тысячн\w+|[mc]illièmes?|centièmes?
+|dixièmes?|mil[eé]simas?|mill[eé]sim[oi]|cent[eé]sim[aoi]s?|d[eé]cim[aoi]s?|setiny|tisíciny|tysięczn\w+)\b"""
 _PARTS_OF: Final = re.compile(_PART, re.IGNORECASE | re.VERBOSE)
 """Such as *1/1000 mm*: sizes counted in parts or multiples of a unit."""
 _SCALED: Final = re.compile(
@@ -100,7 +105,7 @@ _OTHERS: Final = frozenset(
     re.findall(
         r"\S+",
         """ft foot feet fuß fuss pied pieds yd yard yards dm decimeter decimeters decimetre decimetres furlong furlongs fathom fathoms mile
-    miles km angstrom angstroms px pixel pixels counts micrometer mikrometer µ μ mu my col cola palec imperial english customary
+    miles km angstrom angstroms px pixel pixels counts micro micros ångström ångströms micrometer mikrometer micrometro micrómetro µ μ mu my col cola palec imperial english customary
     thousandths tenths nm kn ncm ° º deg °c ℃ % ‰ rpm psi""",
     )
 )

@@ -34,6 +34,8 @@ def test_what_is_no_length_is_none(word: str) -> None:
         ("D40:in", "in"), ("Diamètre (pouces)", "in"), ("Prečnik u inčima", "in"), ("Диаметр в дюймах", "in"), ("Prečnik (mikrona)", "um"),
         ("BoreUm", "um"), ("D40-um", "um"), ("D40 mikron", "um"), ("D40 micro meter", "um"), ("valueMils", "mil"), ("D40 milli inch", "mil"),
         ("Ra micro inch", "uin"), ('Ra µ"', "uin"), ("Ø 40 ±0,01 mm", "mm"), ("Flatness 0.01 mm", "mm"), ("M8x100", None), ("Bohrung E-3", None),
+        ("Diámetro (micras)", "um"), ("Desvio (mícrons)", "um"), ("Odchylka [mikronů]", "um"), ("Bicie mikronów", "um"), ("Scostamento (micrometri)", "um"),
+        ("Medida (polegadas)", "in"), ("Wymiar (cale)", "in"), ("Mitta tuumaa", "in"), ("Mål (tommer)", "in"), ("Medida (milímetros)", "mm"), ("Misura micrometro 3", None), ("Décimal", None),
         ("Micrometer reading", None), ("in_feed", None), ("Position in X", None), ("My size", None), ("CIRCLE1(Bore) X", None), ("Rectangle 1", None), ("Angle plate height", None), ("Max100", None), ('Bore "top"', None),
     ],
 )  # fmt: skip
@@ -82,6 +84,11 @@ def test_the_unit_of_a_header(header: str, unit: str | None) -> None:
         "tenths of mm",
         "10ths",
         "Écart en centièmes",
+        "Scostamento (centesimi)",
+        "Desvío en milésimas",
+        "Dev (micros)",
+        "Misura micrometro",
+        "Odchylka v setiny",
     ]
     + [
         "Area [mm²]",
