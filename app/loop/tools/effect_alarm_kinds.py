@@ -95,8 +95,8 @@ STRONG_EFFECT = register(
 def _still_out(alarm: Alarm) -> str:
     data = alarm.data
     text = _(
-        "{n} parts of {characteristic} in a row are out of tolerance, the newest off by {deviations}, although corrections in full went "
-        "out for {m} of them.{gain} Nothing is corrected through tool {tool} until this alarm is answered."
+        "{n} parts of {characteristic} in a row are out of tolerance, the newest off by {deviations}, although corrections in full were "
+        "issued for {m} of them.{gain} Nothing is corrected through tool {tool} until this alarm is answered."
     )
     return text.format(
         n=data.get("parts"),

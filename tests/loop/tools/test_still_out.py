@@ -43,7 +43,7 @@ def test_two_characteristics_that_take_each_other_back_are_stopped(
     (alarm,) = [each for each in shop.alarms() if each["kind"] == "still_out"]
     assert (alarm["tool_memory"], alarm["characteristic"]) == (4, None)
     assert "in a row are out of tolerance" in alarm["text"]
-    assert "although corrections in full went out for 5 of them" in alarm["text"]
+    assert "although corrections in full were issued for 4 of them" in alarm["text"]
     assert shop.call("GET", f"/machines/{shop.machine}/corrections?status=pending")["items"] == []
     page = Person(shop.server, "operator").open(f"/alarms/{alarm['id']}")
     assert "Still out of tolerance" in page

@@ -19,7 +19,7 @@ from app.core.decision.step import Action
 from app.core.early import acts_early
 from app.core.opposite_effect import LONGEST, Opposed, Step, against, expected_scatter, newest_gain, opposed
 from app.core.overshoot import Overshoot, overshoot
-from app.core.still_out import MOST, Judged, still_out
+from app.core.still_out import IN_VAIN, Judged, still_out
 from app.loop.readings.schemas import ReadingIn
 from app.loop.readings.writer.doubts import follow_statuses
 from app.loop.readings.writer.pending import PendingAlarm, PendingStream, PendingTool, PendingWrites
@@ -101,7 +101,7 @@ def _still_out(stream: PendingStream, parts: Sequence[Part], begin: int) -> Faul
     found = still_out(judged, parameters.limits, parameters.rules.max_step / abs(parameters.factor))
     if found is None:
         return None
-    said: dict[str, Any] = found._asdict() | {"deviations": [part.deviation for part in parts[-MOST:]]}
+    said: dict[str, Any] = found._asdict() | {"deviations": [part.deviation for part in parts[-IN_VAIN:]]}
     if (shown := newest_gain(*_sizes(parts), parameters.factor, begin, _scatter(stream))) is not None:
         said |= {"gain": round(shown[0], 3), "error": round(shown[1], 3)}
     return STILL_OUT, said

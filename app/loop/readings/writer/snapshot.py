@@ -88,7 +88,7 @@ class LoadedAverage(NamedTuple):
 class Part(NamedTuple):
     """A reading that tells of the effect of corrections: its deviation, and the sum of those its part was cut with, mm.
 
-    outstanding: by how much those that it was cut without will change the size, mm. corrected: a correction went out for it, by the
+    outstanding: by how much those that it was cut without will change the size, mm. corrected: a correction was issued for it, by the
     parameters of today.
     """
 
