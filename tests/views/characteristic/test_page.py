@@ -224,6 +224,22 @@ class TestInTheBrowser:
         expect(page.locator("#now")).to_contain_text("Compensation is paused")
         eventually(page, f"{box}.bottom <= innerHeight")
 
+    def test_a_correction_that_comes_moves_nothing(self, shop: Shop, viewer: Person, page: Page) -> None:
+        """The chart is as high with it as without, and all of it stays on the screen."""
+        shop.push([0.4, 0.2])
+        viewer.sign_in(page)
+        page.set_viewport_size({"width": 1280, "height": 800})
+        page.goto(path(shop))
+        drawn(page)
+        live(page)
+        box = f"(({{ top, bottom }}) => [top, bottom])({PLOT}.getBoundingClientRect())"
+        before = page.evaluate(box)
+        shop.read(6.1)
+        expect(page.locator("#now .pending")).to_contain_text("−6.1 µm")
+        drawn(page)
+        assert page.evaluate(box) == before
+        assert before[1] <= 800
+
     @pytest.mark.long
     def test_a_click_on_a_point_shows_its_reading_and_the_link_opens_it(
         self, shop: Shop, viewer: Person, page: Page
