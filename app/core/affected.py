@@ -15,7 +15,7 @@ from itertools import groupby
 from typing import NamedTuple
 
 from app.core.decision.limits import nanometres
-from app.core.natural import Tolerance
+from app.core.natural_limit import Tolerance
 
 MOST_NAMED = 200  # parts between two readings that are named one by one
 _NUMBERED = re.compile(r"(.*?)([0-9]{1,15})")

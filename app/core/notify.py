@@ -199,7 +199,7 @@ class Route:
 class Receiver:
     """A person, or something, that is notified. quiet: when not; away_until: not before; last_at: its last message.
 
-    failing: it could not be reached the last time. busy: it must not be tried now, for it is being tried or pauses. spare: its
+    unreached: the last message did not get there. busy: it must not be tried now, for it is being tried or pauses. spare: its
     last message is known to have had no alarm that stops a machine.
     """
 
@@ -207,7 +207,7 @@ class Receiver:
     quiet: tuple[Hours, ...] = ()
     away_until: datetime | None = None
     last_at: datetime | None = None
-    failing: bool = False
+    unreached: bool = False
     busy: bool = False
     spare: bool = False
 
@@ -298,10 +298,10 @@ def _begun(
     """
     begun: dict[int, datetime] = {}
     empty: set[int] = set()
-    unreached = False
+    no_one = False
     since = alarm.at
     for step in route.steps:
-        if not unreached:
+        if not no_one:
             since = alarm.at + step.after
             if since > now:
                 break
@@ -310,7 +310,7 @@ def _begun(
         for number in known:
             begun.setdefault(number, since)
         reachable = (receivers[number].listens(now, local, urgent=route.urgent) for number in known)
-        unreached = all(receivers[number].failing or not there for number, there in zip(known, reachable, strict=True))
+        no_one = all(receivers[number].unreached or not there for number, there in zip(known, reachable, strict=True))
     return begun, empty
 
 

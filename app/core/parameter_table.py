@@ -7,7 +7,7 @@ from enum import StrEnum
 from functools import partial
 from typing import Any, NamedTuple
 
-from app.core.natural import NaturalLimit
+from app.core.natural_limit import NaturalLimit
 
 LARGEST_LENGTH = 100_000.0  # mm; no machine tool is a hundred metres long
 

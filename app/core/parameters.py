@@ -15,7 +15,7 @@ from typing import Any
 from app.core.decision.limits import Limits, nanometres
 from app.core.decision.step import Rules
 from app.core.fits import with_fit
-from app.core.natural import (
+from app.core.natural_limit import (
     NaturalLimit,
     Tolerance,
     assumed,

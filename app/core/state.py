@@ -6,7 +6,7 @@ from datetime import datetime, timedelta
 from enum import StrEnum
 
 from app.core.decision.limits import beyond_natural, nanometres, reaches, within_tolerance
-from app.core.natural import NaturalLimit
+from app.core.natural_limit import NaturalLimit
 from app.core.parameters import Parameters
 
 DRIFT = 7  # readings in a row on one side, beyond the zero range, are a drift

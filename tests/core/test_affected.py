@@ -5,7 +5,7 @@ import random
 import pytest
 
 from app.core.affected import MOST_NAMED, Cut, names_between, stretches, verdict_of
-from app.core.natural import Tolerance
+from app.core.natural_limit import Tolerance
 
 LIMITS = Tolerance(-0.008, 0.008)
 

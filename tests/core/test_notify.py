@@ -196,7 +196,7 @@ class TestWhom:
         assert to(due([steps], NOON + 10 * MINUTE, record=told)) == [2]
 
     def test_the_next_step_follows_at_once_where_nobody_can_be_reached(self) -> None:
-        assert to(due([route((0, 1), (10, 2), (20, 3))], NOON, failing=True, busy=True)) == [2]
+        assert to(due([route((0, 1), (10, 2), (20, 3))], NOON, unreached=True, busy=True)) == [2]
 
     def test_away_or_in_quiet_hours_nobody_is_reached_either(self) -> None:
         steps, quiet = route((0, 1), (10, 2)), (Hours(EVERY_DAY, time(22), time(13)),)
@@ -206,8 +206,8 @@ class TestWhom:
 
     def test_a_digest_of_a_step_that_stands_in_ends_with_its_minutes(self) -> None:
         steps = route((0, 1), (30, 2), digest=5 * MINUTE)
-        assert due([steps], NOON + 4 * MINUTE, failing=True, busy=True) == []
-        assert to(due([steps], NOON + 5 * MINUTE, failing=True, busy=True)) == [2]
+        assert due([steps], NOON + 4 * MINUTE, unreached=True, busy=True) == []
+        assert to(due([steps], NOON + 5 * MINUTE, unreached=True, busy=True)) == [2]
 
     def test_a_receiver_that_is_gone_is_passed_over(self) -> None:
         assert to(due([route((0, 9), (10, 2))], NOON)) == [2]

@@ -12,7 +12,7 @@ from typing import Any
 import pytest
 
 from app import logs
-from app.core import fits, natural, number_text
+from app.core import fits, natural_limit, number_text
 from app.core.printed_line import LineReader
 from app.core.rotary import results
 from app.errors import Invalid
@@ -95,7 +95,7 @@ def test_what_is_made_of_a_cell(call: Callable[[str], Any]) -> None:
         lambda text: typed(text, ""),
         forms.whole_numbers,
         fits.fit_of,
-        natural.looks_natural,
+        natural_limit.looks_natural,
         programs.guessed,
         logs.without_secrets,
         lambda text: LineReader().feed(text.encode()),

@@ -13,7 +13,7 @@ wear                    ``|D| < R36``               belongs to *probe_fault* (R3
 probe_fault             beyond
 ======================  ==========================  ============================================
 
-Where the target is a natural limit (`app.core.natural`), R35 takes the place of R35/2, and what lies beyond it is no measurement.
+Where the target is a natural limit (`app.core.natural_limit`), R35 takes the place of R35/2, and what lies beyond it is no measurement.
 
 Lengths are mm. They are compared in whole nanometres, so that 0.010 is 0.010 whatever binary
 fractions it went through.
@@ -22,7 +22,7 @@ fractions it went through.
 from enum import StrEnum
 from typing import TYPE_CHECKING, Any, NamedTuple, Protocol, overload
 
-from app.core.natural import half_of
+from app.core.natural_limit import half_of
 
 if TYPE_CHECKING:
     import numpy as np

@@ -13,7 +13,7 @@ import re
 from collections.abc import Iterator, Mapping
 from typing import Any
 
-from app.core.natural import assumed, half_width
+from app.core.natural_limit import assumed, half_width
 from app.core.number_text import has_printed_minus
 from app.core.parameters import BY_NAME, FieldKind, Parameters, mean_nominal
 from app.core.programs import printed_macros, unit_check

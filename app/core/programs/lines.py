@@ -13,7 +13,7 @@ from types import MappingProxyType
 from typing import Any, NamedTuple
 
 from app.core.decision.step import rounded
-from app.core.natural import NaturalLimit, assumed
+from app.core.natural_limit import NaturalLimit, assumed
 from app.core.number_text import number_or_none, plain
 from app.core.parameters import BY_NAME, FIELDS, Field, FieldKind, Parameters
 

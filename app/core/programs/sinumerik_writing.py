@@ -5,7 +5,7 @@ from dataclasses import replace
 from typing import NamedTuple
 
 from app.core.decision.step import DECIMALS
-from app.core.natural import NaturalLimit
+from app.core.natural_limit import NaturalLimit
 from app.core.parameters import BY_R, FIELDS, TWO_POINT_SWITCH, Direction, FieldKind, Parameters, Variant
 from app.core.probing import direction_of
 from app.core.programs import unit_check

@@ -14,7 +14,7 @@ from enum import IntEnum
 from pathlib import Path
 from typing import NamedTuple
 
-from app.core.natural import NaturalLimit
+from app.core.natural_limit import NaturalLimit
 from app.files.aqdef.description import encoding_of
 from app.files.aqdef.fields import CATALOGUES, Catalogue, most_of
 from app.files.aqdef.values import OF_CHARACTERISTIC, OF_FIELD

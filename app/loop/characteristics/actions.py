@@ -10,7 +10,7 @@ from app.access.audit.actions import record
 from app.core.decision.decide import voids_corrections
 from app.core.decision.limits import nanometres
 from app.core.fits import with_fit
-from app.core.natural import target_of
+from app.core.natural_limit import target_of
 from app.core.parameters import (
     BY_R,
     TWO_POINT_SWITCH,

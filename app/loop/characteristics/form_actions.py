@@ -10,7 +10,7 @@ from sqlalchemy import select
 from sqlalchemy.orm import Session
 
 from app.core.fits import with_fit
-from app.core.natural import NaturalLimit
+from app.core.natural_limit import NaturalLimit
 from app.core.parameters import BY_R, Parameters, Variant, cautious
 from app.core.variants import FormResult, forms_of
 from app.errors import Conflict, FieldError, Invalid

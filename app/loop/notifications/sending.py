@@ -222,7 +222,7 @@ def _about_alarms(
             week(map(HoursIn.model_validate, row.quiet)),
             row.away_until,
             last[number],
-            failing=row.failures > 0,
+            unreached=row.failures > 0,
             busy=not same[number] <= free,
             spare=number in calm,
         )

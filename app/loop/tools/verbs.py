@@ -166,6 +166,7 @@ CORRECTION: tuple[Verb[OfCorrection, Any], ...] = (
     Verb(
         name=RELEASE.verb,
         when=RELEASE.of,
+        role="operator",
         body=CorrectionDecisionIn,
         act=release_correction,
         own=_decided_so(RELEASE),
@@ -181,6 +182,7 @@ CORRECTION: tuple[Verb[OfCorrection, Any], ...] = (
     Verb(
         name=APPROVE.verb,
         when=APPROVE.of,
+        role="operator",
         body=CorrectionDecisionIn,
         act=approve_correction,
         own=_decided_so(APPROVE),
@@ -194,6 +196,7 @@ CORRECTION: tuple[Verb[OfCorrection, Any], ...] = (
     Verb(
         name="applied",
         when=("pending",),
+        role="operator",
         body=AppliedIn,
         needs_body=False,
         by_machine=True,
@@ -210,6 +213,7 @@ CORRECTION: tuple[Verb[OfCorrection, Any], ...] = (
     Verb(
         name=REJECT.verb,
         when=REJECT.of,
+        role="operator",
         body=RejectionIn,
         act=reject_correction,
         by_machine=True,

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from sqlalchemy.orm import Session
 
 from app.core.decision.limits import FAULT, in_nanometres, nanometres, within
-from app.core.natural import NaturalLimit, tolerance_about_target
+from app.core.natural_limit import NaturalLimit, tolerance_about_target
 from app.core.spc import USUAL_READINGS, in_time, normality, stability, uncompensated
 from app.core.spc.capability import (
     ENOUGH_READINGS,

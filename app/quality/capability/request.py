@@ -6,7 +6,7 @@ from fastapi import Depends, Query
 from sqlalchemy.orm import Session
 
 from app.core.context import Chosen
-from app.core.natural import NaturalLimit
+from app.core.natural_limit import NaturalLimit
 from app.core.period import Period
 from app.errors import Invalid
 from app.language.i18n import _

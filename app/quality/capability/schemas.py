@@ -5,7 +5,7 @@ from typing import Any, Literal
 
 from pydantic import BaseModel, Field
 
-from app.core.natural import NaturalLimit
+from app.core.natural_limit import NaturalLimit
 from app.core.spc.capability import Fallout, Index, PercentileCapability
 from app.core.spc.distributions import Family
 from app.core.spc.fitting import Fit, Fitted

@@ -2,7 +2,7 @@
 
 from math import isnan
 
-from app.core.natural import NaturalLimit
+from app.core.natural_limit import NaturalLimit
 from app.core.spc.capability import CAPABLE, VERY_CAPABLE, Caution, Index
 from app.core.spc.fitting import Fitted
 from app.core.spc.in_time import ALPHA, InTime, Location, Model, Test

@@ -31,7 +31,7 @@ from app.charts import (
 )
 from app.core import forecast
 from app.core.forecast import PUBLIC_WIDENING, Forecast
-from app.core.natural import NaturalLimit, tolerance_about_target
+from app.core.natural_limit import NaturalLimit, tolerance_about_target
 from app.core.wear import Fit, Towards
 from app.language.formatting import um
 from app.language.i18n import _

@@ -6,7 +6,7 @@ from typing import Any
 
 from app.core.forecast import ENOUGH, NO_RECORD, Forecast, Record
 from app.core.hunting import GOAL, Hunting, LoopVerdict, Remedy
-from app.core.natural import half_width
+from app.core.natural_limit import half_width
 from app.core.parameters import Parameters
 from app.core.wear import FEWEST, Fit, Towards
 from app.language.formatting import NO_BREAK_SPACE, grouped, percent, plain_um, signed

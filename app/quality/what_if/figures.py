@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 from app.charts import Axis, Chart, Dots, Panel, Pen, Room, Rule, Series, bold, reading_axis
-from app.core.natural import NaturalLimit, tolerance_about_target
+from app.core.natural_limit import NaturalLimit, tolerance_about_target
 from app.language.i18n import _
 
 FAR = 3.0  # times the tolerance: what deviates further is drawn at the edge

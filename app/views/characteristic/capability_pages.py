@@ -9,7 +9,7 @@ from sqlalchemy.orm import Session
 
 from app.access.deps import AnyCaller, require
 from app.core.context import Chosen, ContextField
-from app.core.natural import NaturalLimit
+from app.core.natural_limit import NaturalLimit
 from app.core.period import ALWAYS
 from app.core.spc.refusal import Refused
 from app.errors import Invalid

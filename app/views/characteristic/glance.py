@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from markupsafe import Markup, escape
 
 from app.core.decision.limits import HasLimits, Limits, classify, within_tolerance
-from app.core.natural import half_of, natural_of, tolerance_about_target
+from app.core.natural_limit import half_of, natural_of, tolerance_about_target
 from app.language.formatting import read_um, um_limit
 from app.language.i18n import _
 from app.views.characteristic.figures.labels import judged_sides

@@ -23,7 +23,7 @@ from app.charts import (
     nothing,
     time_axis,
 )
-from app.core.natural import NaturalLimit, Tolerance, tolerance_about_target
+from app.core.natural_limit import NaturalLimit, Tolerance, tolerance_about_target
 from app.language.formatting import tolerance_um, um
 from app.language.i18n import _
 

@@ -11,7 +11,7 @@ from starlette.responses import RedirectResponse
 
 from app.access.deps import Caller, Engineer, Viewer, require
 from app.core.fits import fit_of
-from app.core.natural import looks_natural
+from app.core.natural_limit import looks_natural
 from app.core.parameters import AVERAGE_LOCATIONS, BY_NAME, Mode, Parameters
 from app.core.plausibility import suggested_jump
 from app.core.suggested import SuggestedLimits

@@ -7,7 +7,7 @@ from collections.abc import Collection, Mapping
 from typing import Any, NamedTuple
 
 from app.core.fits import fit_of
-from app.core.natural import NaturalLimit, assumed, half_width
+from app.core.natural_limit import NaturalLimit, assumed, half_width
 from app.core.number_text import number_or_none, plain
 from app.core.parameters import BY_NAME, FIELDS, Field, FieldKind, default_averaging_limit, mean_nominal
 from app.core.programs.lines import written

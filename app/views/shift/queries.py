@@ -12,7 +12,7 @@ from sqlalchemy import select, text
 from sqlalchemy.orm import Session
 
 from app.core.decision.limits import Zone, nanometres, within_sql
-from app.core.natural import half_width
+from app.core.natural_limit import half_width
 from app.core.period import Period
 from app.core.spc.capability import CAPABLE
 from app.errors import Invalid

@@ -4,7 +4,7 @@ from typing import Any
 
 from hypothesis import strategies as st
 
-from app.core.natural import NaturalLimit, assumed, half_width
+from app.core.natural_limit import NaturalLimit, assumed, half_width
 from app.core.parameters import FIELDS, Feature, Field, FieldKind, Mode, Parameters, read
 
 ORDERED = ("zero_range", "averaging_limit", "wear_limit", "confidence_limit")

@@ -11,7 +11,7 @@ from aqdefreader.file import DfqFile
 from hypothesis import given
 from hypothesis import strategies as st
 
-from app.core.natural import NaturalLimit
+from app.core.natural_limit import NaturalLimit
 from app.files.aqdef import description as aqdef
 from app.files.aqdef import values as aqdef_values
 from app.files.aqdef.description import Source

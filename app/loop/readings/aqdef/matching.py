@@ -5,7 +5,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
-from app.core.natural import NaturalLimit, looks_natural, target_of
+from app.core.natural_limit import NaturalLimit, looks_natural, target_of
 from app.core.parameters import Parameters, cautious
 from app.core.plausibility import INCH, inch_warnings, looks_like_inches
 from app.files.aqdef.description import LONGEST, Characteristic, Description

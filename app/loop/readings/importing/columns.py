@@ -4,8 +4,9 @@ from collections.abc import Mapping, Sequence
 
 from app.errors import FieldError, Invalid
 from app.files.formats.column_names import NAMES, key_of
-from app.files.formats.units import in_another_scale
+from app.files.formats.units import LENGTHS, UnknownUnit, in_another_scale, unit_in
 from app.language.i18n import _
+from app.loop.readings.importing.refusals import wrong
 from app.loop.readings.origin import COLUMNS
 
 ORIGIN = COLUMNS[:2]
@@ -105,6 +106,20 @@ def nominal_of(
         return columns.get("nominal", ())
     guess = guesses_of(header).get("nominal", ())
     return () if set(guess) & {place for places in columns.values() for place in places} else guess
+
+
+def column_unit(column: str, said: str | None) -> str | None:
+    """The unit of a column's numbers: what a person said, else what its header names. Raises `Invalid`."""
+    try:
+        return said or unit_in(column)
+    except UnknownUnit as error:
+        raise wrong(
+            "unit",
+            _(
+                "The header of the column {column} names the unit {unit}, which is not known as a length. "
+                "Say in which unit its numbers are: {units}."
+            ).format(column=column, unit=error.word, units=", ".join(LENGTHS)),
+        ) from None
 
 
 def _places(header: tuple[str, ...], column: str) -> tuple[int, ...] | None:

@@ -4,7 +4,7 @@ from collections.abc import Collection
 from enum import Enum
 from typing import NamedTuple
 
-from app.core.natural import NaturalLimit
+from app.core.natural_limit import NaturalLimit
 from app.core.number_text import NotANumber, read_number
 from app.files.formats.cell_values import Unreadable, folded
 from app.files.formats.column_names import LOWER_LIMITS, LOWER_OF_EITHER, UPPER_LIMITS, UPPER_OF_EITHER

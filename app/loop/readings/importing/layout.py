@@ -17,17 +17,16 @@ from app.files.formats.headings import TOP, as_wide, heading, is_reading, is_sum
 from app.files.formats.number_with_unit import number_and_unit
 from app.files.formats.units import LENGTHS, UnknownUnit, length_unit, unit_above
 from app.language.i18n import _
-from app.loop.readings.importing.columns import DRAWN, by_places, columns_of, fits, guesses_of, nominal_of
-from app.loop.readings.importing.named_times import in_doubt, on_times
+from app.loop.readings.importing.columns import DRAWN, by_places, column_unit, columns_of, fits, guesses_of, nominal_of
 from app.loop.readings.importing.refusals import (
     LONGEST_NAME,
     heading_or_reading,
     long_name,
     refuse_no_table,
     refuse_wide,
-    unit_of,
     wrong,
 )
+from app.loop.readings.importing.times_wording import in_doubt, on_times
 
 NO_DIGIT = "*"
 MOST_NAMES = 1_000
@@ -282,7 +281,7 @@ def _csv_layout(path: Path, wishes: Wishes, zone: ZoneInfo | None, kind: str = "
         letters="" if wishes.encoding or encoding.startswith("utf") else _letters(chain(top, below)),
         delimiter=delimiter,
         decimal=wishes.decimal or delimited.decimal_of(sample),
-        said_unit=(unit_of(header[place], wishes.unit) or units[place]) if "measured" in columns else wishes.unit,
+        said_unit=(column_unit(header[place], wishes.unit) or units[place]) if "measured" in columns else wishes.unit,
         units=units,
         doubt="" if wishes.unit or "unit" in columns else doubt,
         questions=(heading_or_reading(head, header),) if bare is None else (),
@@ -457,7 +456,7 @@ def _json_layout(path: Path, wishes: Wishes, zone: ZoneInfo | None, *, is_list: 
     if not header:
         raise wrong("file", _("The file holds no JSON objects."))
     columns = columns_of(header, wishes.mapping)
-    unit = unit_of(header[columns["measured"][0]] if "measured" in columns else "", wishes.unit)
+    unit = column_unit(header[columns["measured"][0]] if "measured" in columns else "", wishes.unit)
     layout = Layout(
         "list" if is_list else "lines",
         header,

@@ -3,7 +3,6 @@
 from collections.abc import Collection, Sequence
 
 from app.errors import FieldError, Invalid
-from app.files.formats.units import LENGTHS, UnknownUnit, unit_in
 from app.language.i18n import _
 
 MOST_COLUMNS = 500
@@ -14,20 +13,6 @@ LONGEST_NAME = 1_000
 def wrong(where: str, message: str) -> Invalid:
     """One thing that is wrong with the file or with what was said about it."""
     return Invalid(f"{where}: {message}", _("Nothing was imported."), errors=[FieldError(where, message)])
-
-
-def unit_of(column: str, said: str | None) -> str | None:
-    """The unit of a column's numbers: what a person said, else what its header names. Raises `Invalid`."""
-    try:
-        return said or unit_in(column)
-    except UnknownUnit as error:
-        raise wrong(
-            "unit",
-            _(
-                "The header of the column {column} names the unit {unit}, which is not known as a length. "
-                "Say in which unit its numbers are: {units}."
-            ).format(column=column, unit=error.word, units=", ".join(LENGTHS)),
-        ) from None
 
 
 def refuse_wide(header: Collection[str]) -> None:

@@ -19,11 +19,10 @@ from app.loop.readings.aqdef.actions import machine_for, set_up
 from app.loop.readings.aqdef.matching import NEW, Content
 from app.loop.readings.importing import drawn
 from app.loop.readings.importing.cells import MOST_FLAWS, Flaw
-from app.loop.readings.importing.columns import ORIGIN
+from app.loop.readings.importing.columns import ORIGIN, column_unit
 from app.loop.readings.importing.history import Flawed, Progress, Summary, store_history
 from app.loop.readings.importing.layout import Layout
 from app.loop.readings.importing.lines import Read, lines, read_apart, read_here
-from app.loop.readings.importing.refusals import unit_of
 from app.loop.readings.records import Entry
 
 
@@ -70,7 +69,7 @@ def layout_of(layout: Layout, column: Column, unit: str | None) -> Layout:
     fields = {
         name: places for name, places in layout.columns.items() if name not in {"measured", "touches", "key", *ORIGIN}
     }
-    own_unit = unit_of(layout.header[column.place], unit) or (layout.units[column.place] if layout.units else None)
+    own_unit = column_unit(layout.header[column.place], unit) or (layout.units[column.place] if layout.units else None)
     if own_unit is None:
         layout.refuse_doubt()
     layout.refuse_thousands(column.place, own_unit)

@@ -12,7 +12,7 @@ from datetime import UTC, datetime
 from app.core.decision.decide import Decision, LoopState, ReadingAlarm, decide, needs_approval, outstanding_effect
 from app.core.decision.limits import Zone
 from app.core.decision.step import DECIMALS, Action, Code, deviation_of
-from app.core.natural import NaturalLimit
+from app.core.natural_limit import NaturalLimit
 from app.core.parameters import Parameters
 from app.core.plausibility import is_jump, moved, uncorrected
 from app.core.probing import Measured, TouchError, measured_value, unmeasured

@@ -12,7 +12,7 @@ from sqlalchemy import text
 from sqlalchemy.orm import Session
 
 from app.core.decision.limits import FAULT, Zone, nanometres, nanometres_sql, within, within_sql
-from app.core.natural import half_width
+from app.core.natural_limit import half_width
 from app.db.period import in_period_sql
 from app.loop.summaries.queries.chart_data import excluded_of
 from app.loop.summaries.queries.context import in_context_sql, written

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from app.charts import Axis, Bars, Chart, Dots, Note, Panel, Pen, Room, Rule, Series, bold, empty, time_axis
 from app.core.decision.limits import HasLimits, Limits, in_nanometres
-from app.core.natural import NaturalLimit, half_of, natural_of, tolerance_about_target
+from app.core.natural_limit import NaturalLimit, half_of, natural_of, tolerance_about_target
 from app.language.formatting import grouped, um
 from app.language.i18n import _
 from app.views.characteristic.figures.blocks import Block, envelope, summed_up

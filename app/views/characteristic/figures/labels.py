@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from app.charts import BANDS, Ground, Note, Pen, Role, Rule, Share
 from app.core.decision.limits import HasLimits
-from app.core.natural import NaturalLimit, half_of, tolerance_about_target
+from app.core.natural_limit import NaturalLimit, half_of, tolerance_about_target
 from app.language.formatting import MINUS, NO_BREAK_SPACE, NOTHING, um_limit
 from app.language.i18n import _
 from app.views.characteristic.figures.scale import Band, Scale, ZoneScale, bands, ends_of

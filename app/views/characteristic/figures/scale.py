@@ -4,7 +4,7 @@ The bands between the limits R33, R34, R35/2, R37, R36 differ in width by a fact
 equally tall and is linear inside; the open band beyond R36 is compressed into the same height. `TrueScale` is linear in µm
 around the tolerance; what lies further out is drawn at its edge.
 
-Beyond a natural limit (`app.core.natural`) there is only the scatter of measuring, within R33, and one open band of what cannot
+Beyond a natural limit (`app.core.natural_limit`) there is only the scatter of measuring, within R33, and one open band of what cannot
 be: the chart is short on that side.
 """
 
@@ -17,7 +17,7 @@ from typing import Literal, Protocol
 
 from app.core.decision.limits import HasLimits, nanometres
 from app.core.decision.limits import Limits as Nanometres
-from app.core.natural import NaturalLimit, half_of, natural_of
+from app.core.natural_limit import NaturalLimit, half_of, natural_of
 
 ScaleName = Literal["zones", "true"]
 

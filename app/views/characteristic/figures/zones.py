@@ -18,7 +18,7 @@ from typing import Literal
 from app.charts import Axis, Chart, Dots, Faded, Note, Panel, Pen, Room, Series, bold, empty
 from app.charts import Mark as Drawn
 from app.core.decision.limits import HasLimits, Limits
-from app.core.natural import half_of
+from app.core.natural_limit import half_of
 from app.language.formatting import as_read, read_um, um
 from app.language.i18n import _
 from app.language.times import plant_zone

@@ -7,7 +7,7 @@ from zoneinfo import ZoneInfo
 from sqlalchemy.orm import Session
 
 from app.core.decision.step import rounded
-from app.core.natural import NaturalLimit
+from app.core.natural_limit import NaturalLimit
 from app.errors import InbandError
 from app.files.documents.content import Fact, Report, Section, count, deviation, moment, size, width, words
 from app.language.i18n import _

@@ -5,7 +5,7 @@ from types import SimpleNamespace
 import pytest
 
 from app.charts import Ground, Note, Rule
-from app.core.natural import NaturalLimit
+from app.core.natural_limit import NaturalLimit
 from app.views.characteristic.figures.distribution import histogram_counts, histogram_edges, histogram_figure
 from app.views.characteristic.figures.scale import ScaleName, TrueScale, ZoneScale, bands, ends_of
 from app.views.characteristic.figures.zones import Point, zone_chart

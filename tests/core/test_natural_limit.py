@@ -11,7 +11,7 @@ from app.core.decision.decide import LoopState, ReadingAlarm, decide
 from app.core.decision.limits import Zone
 from app.core.decision.loops import Quiet, Series, quiet_run, rows_of
 from app.core.decision.step import Code
-from app.core.natural import NaturalLimit, looks_natural
+from app.core.natural_limit import NaturalLimit, looks_natural
 from app.core.parameters import ParameterError, Parameters, default_averaging_limit, read
 from app.core.spc.capability import Limits, of_percentiles
 from app.core.state import CharacteristicState, Known, drift, state_of
