@@ -38,6 +38,7 @@ from app.quality.capability.kinds import Week
 MOST_BARS, FEWEST_BARS = 60, 8
 CURVE = 161  # points of a drawn curve
 MOST_POINTS, TAIL = 600, 40  # of the probability plot, and of each of its ends that are drawn whichever
+BELOW = Share(-0.2)
 MOST_CHANGES = 60  # lines of tool changes; more are a fence
 SHARES = (0.00135, 0.01, 0.05, 0.25, 0.5, 0.75, 0.95, 0.99, 0.99865)
 
@@ -96,8 +97,11 @@ def histogram(drawn: CapabilityChart) -> Chart:
                     scale * exp(-0.5 * ((x - drawn.mean) / sigma) ** 2) / (sigma * sqrt(2 * pi)) for x in at.tolist()
                 ]
                 marks.append(Series((at * 1000).tolist(), height, Pen("correction", 2, dash), meta=dash, name=name))
+    beyond = _beyond(drawn, top=True)
+    if not any(isinstance(mark, Series) and mark.name for mark in marks):
+        beyond = [_below(note) for note in beyond]
     return _chart(
-        [*marks, *_limit_lines(drawn, low, high), *_beyond(drawn, top=True)],
+        [*marks, *_limit_lines(drawn, low, high), *beyond],
         low,
         high,
         Axis(_("Readings"), from_zero=True, ticks=5),
@@ -143,14 +147,21 @@ def probability(drawn: CapabilityChart) -> Chart:
 
 
 def small(chart: Chart) -> Chart:
-    """The same without a legend, for which there is no room."""
-    panels = [
-        replace(
-            panel, marks=[replace(mark, name="") if isinstance(mark, Series | Bars) else mark for mark in panel.marks]
-        )
-        for panel in chart.panels
-    ]
-    return replace(chart, panels=panels, room=Room(78, 22, 54, 40))
+    """The same without a legend, for which there is no room; readings beyond are named in place of the axis below."""
+    panels = [replace(panel, marks=[_small(mark) for mark in panel.marks]) for panel in chart.panels]
+    beyond = any(isinstance(mark, Note) and mark.y == BELOW for panel in panels for mark in panel.marks)
+    return replace(chart, panels=panels, x=replace(chart.x, title="") if beyond else chart.x, room=Room(78, 22, 54, 40))
+
+
+def _small(mark: Mark) -> Mark:
+    if isinstance(mark, Series | Bars):
+        return replace(mark, name="")
+    return _below(mark) if isinstance(mark, Note) and mark.ground else mark
+
+
+def _below(note: Note) -> Note:
+    """The note of the readings beyond where no legend is: below the picture."""
+    return replace(note, y=BELOW, upward="top", ground=False)
 
 
 def _near(drawn: CapabilityChart) -> Floats:
@@ -159,7 +170,7 @@ def _near(drawn: CapabilityChart) -> Floats:
 
 
 def _beyond(drawn: CapabilityChart, *, top: bool) -> list[Note]:
-    """Note at the right, where the picture is empty: the number of readings outside it."""
+    """Note at the right, where the picture is empty and no legend can meet it: the number of readings outside it."""
     far, middle = drawn.values[far_off(drawn.values)], float(np.median(drawn.values))
     words = []
     for left, values in ((True, far[far < middle]), (False, far[far > middle])):
