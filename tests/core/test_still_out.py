@@ -120,6 +120,12 @@ def test_a_worn_tool_that_is_held_is_not_counted() -> None:
     assert still_out([*[corrected] * 3, held, *[corrected] * 2], rules()) == StillOut(6, 4)
 
 
+def test_what_is_in_tolerance_with_all_counted_in_asked_for_a_part_of_it_only() -> None:
+    """Parts on the way, of which each asks for 4 µm more: none has shown yet what became of that."""
+    assert still_out([Judged(0.012, 0.004, True)] * 20, rules()) is None
+    assert still_out([Judged(0.012, 0.012, True)] * 5, rules()) is not None
+
+
 @runs(200, 5_000)
 def test_a_process_that_can_hold_its_tolerance_is_not_paused(runs: int) -> None:
     """Cp 1, wear of a tenth of the scatter a part, every setting of the loop; a hundred parts each."""

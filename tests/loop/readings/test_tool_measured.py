@@ -75,6 +75,14 @@ def test_the_offset_becomes_what_the_tool_differs_by_however_often_it_is_measure
         assert figures["rejects"] == figures["undersize"] == 0, "sizes of tools are no parts"
 
 
+def test_a_tool_that_wears_by_more_than_its_tolerance_is_corrected_each_time(presetter: Shop) -> None:
+    """None of its sizes comes back, for a longer offset makes no tool longer: it is not *still out of tolerance*."""
+    for times in range(1, 8):
+        answer = presetter.read(-30.0 * times, f"{presetter.machine}-length")
+        assert (answer["action"], answer["correction"]["amount"]) == ("correct", -0.03), times
+        presetter.correction(answer["correction"]["number"], "applied")
+
+
 def test_a_worn_tool_is_worn_though_its_offset_has_it(presetter: Shop) -> None:
     length = f"{presetter.machine}-length"
     for size in (-150.0, -290.0):

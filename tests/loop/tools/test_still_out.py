@@ -61,15 +61,16 @@ def test_what_was_only_measured_does_not_count(shop: Shop) -> None:
     assert shop.read(12.0, key)["action"] == "correct"
 
 
-def test_steps_that_were_too_small_are_not_held_against_larger_ones(shop: Shop) -> None:
-    """Four parts out while the largest step was 1 µm; then an engineer allows it more."""
+def test_small_steps_take_more_parts(shop: Shop) -> None:
+    """The largest step is 1 µm, so each part is out by 1 µm less; then an engineer allows more."""
     key, offset, last = shop.another("seat", tool_memory=4, average_memory=6, max_step=0.001, **SEAT), 0.0, 0
-    for _part in range(4):
-        correction = shop.read(round(18 + offset * 1000, 3), key, correction_in_effect=last)["correction"]
-        offset, last = round(offset + correction["amount"], 9), correction["number"]
+    for part in range(8):
+        answer = shop.read(round(18 + offset * 1000, 3), key, correction_in_effect=last)
+        assert answer["action"] == "correct", part
+        offset, last = round(offset + answer["correction"]["amount"], 9), answer["correction"]["number"]
         shop.correction(last, "applied", offset_after=offset, client=shop.machine_client)
     shop.call("PATCH", f"/characteristics/{key}", parameters={"max_step": 0.02}, reason="too slow")
-    assert shop.read(14.0, key, correction_in_effect=last)["action"] == "correct"
+    assert shop.read(9.0, key, correction_in_effect=last)["action"] == "correct"
 
 
 def test_an_offset_that_the_control_does_not_use_ends_after_five(shop: Shop) -> None:
