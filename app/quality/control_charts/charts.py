@@ -27,9 +27,9 @@ from app.loop.summaries import queries as statistics
 from app.loop.summaries.queries import Window
 from app.quality.control_charts import queries
 from app.quality.control_charts.monitoring import Place
-from app.quality.control_charts.queries import LOOK_BACK, Charted, charted, judged_by
+from app.quality.control_charts.queries import LOOK_BACK, Charted, charted, judged_by, restarts
 from app.quality.control_charts.rules_queries import rules_in_force
-from app.quality.control_charts.series_queries import Whole, read
+from app.quality.control_charts.series_queries import read
 from app.quality.control_charts.tables import Baseline
 from app.quality.control_charts.view import Marks, View, only, since
 
@@ -104,7 +104,7 @@ def _drawn(
     main = replace(
         main,
         settling=_settling(points, window),
-        signals=rules.signals_of(points.chart, chosen, _restarts(baseline, points.first)),
+        signals=rules.signals_of(points.chart, chosen, restarts(baseline, points.first)),
     )
     return since(main, window.first)
 
@@ -180,7 +180,7 @@ def _judged(view: View, chart: ControlChart, baseline: Baseline) -> View:
         centre=chart.centre,
         lower=chart.lower,
         upper=chart.upper,
-        signals=rules.signals_of(chart, [RULES[RuleName.NELSON_1]], _restarts(baseline, view.first)),
+        signals=rules.signals_of(chart, [RULES[RuleName.NELSON_1]], restarts(baseline, view.first)),
     )
 
 
@@ -198,14 +198,6 @@ def _neighbours(
         settling=_settling(points, window),
         left_out=points.read.left_out,
     )
-
-
-def _restarts(baseline: Baseline, first: Whole) -> list[int]:
-    """The points at which the rules begin again: the first of the baseline's period, and the first that is monitored.
-
-    What lies before the period was another process. The stored signals begin with the first reading after it.
-    """
-    return [int(at) for at in np.searchsorted(first, [baseline.first_sequence, baseline.last_sequence + 1])]
 
 
 def _moving_ranges(points: Charted, window: Window) -> View:
@@ -244,7 +236,7 @@ def _remembering(
     points = charted(session, current, singly, replace(window, first=begin))
     series = points.series.only(points.series.sequence >= begin)  # what was read before set levels
     sequence, values = series.sequence, series.values
-    pieces = [part for part in np.split(values, _restarts(baseline, sequence)) if len(part)]
+    pieces = [part for part in np.split(values, restarts(baseline, sequence)) if len(part)]
     inside = sequence >= window.first
     view = _neighbours(kind, points, series, inside, window)
     if not inside.any():
@@ -301,5 +293,5 @@ def _sums(view: View, baseline: Baseline, pieces: list[Floats], shown: NDArray[n
         centre=0.0,
         lower=-together.limit,
         upper=together.limit,
-        signals=rules.signals_of_cusum(together, _restarts(baseline, view.first)),
+        signals=rules.signals_of_cusum(together, restarts(baseline, view.first)),
     )

@@ -124,6 +124,15 @@ class Charted:
         return len(self.last)
 
 
+def restarts(baseline: Baseline, first: Whole) -> list[int]:
+    """The points at which the rules begin again: the first of the baseline's period, and the first that is monitored.
+
+    What lies before the period was another process. The stored signals begin with the first reading after it.
+    first: the first reading of each point, rising.
+    """
+    return [int(at) for at in np.searchsorted(first, [baseline.first_sequence, baseline.last_sequence + 1])]
+
+
 def charted(session: Session, current: CurrentCharacteristic, baseline: Baseline, window: Window) -> Charted:
     """The points whose last reading lies in the window: what a point is does not depend on where the window begins.
 

@@ -27,7 +27,7 @@ from app.quality.control_charts.monitoring import (
     settings_at,
     size_of,
 )
-from app.quality.control_charts.queries import baseline_in_force, charted
+from app.quality.control_charts.queries import baseline_in_force, charted, restarts
 from app.quality.control_charts.signal_tables import RuleSet
 from app.quality.control_charts.tables import Baseline
 
@@ -124,8 +124,7 @@ def _found(baseline: Baseline, place: Place, names: tuple[RuleName, ...], piece:
     """By the points of the baseline's period, and again by those after it and before it, as the chart and the job do."""
     if piece is None or not names:
         return []
-    parts = np.searchsorted(piece.first, [baseline.first_sequence, baseline.last_sequence + 1])
-    at = np.searchsorted(parts, np.arange(len(piece.first)), side="right")
+    at = np.searchsorted(restarts(baseline, piece.first), np.arange(len(piece.first)), side="right")
     pieces = (piece.only(at == part) for part in np.unique(at))
     return [span for each in pieces for span in Watch(settings_at(baseline, place), dict.fromkeys(names, 0)).feed(each)]
 
