@@ -36,7 +36,11 @@ only through each other's queries and actions. frontend/ and migrations/ lie bes
         what_if          stored readings replayed with other settings, maps of them, proposals of changes
         gauge_studies    Cg, R&R, linearity, bias, and their advice for R33
         capability       Cp to Ppk with intervals, normality, behaviour in time, the process without its corrections
-        control_charts   control charts by frozen baselines, run rules and their signals
+        control_charts   control charts by frozen baselines, with the signals of run rules
+        count_charts     charts of counts: p, np, c, u; nothing is stored
+        chart_signals    signals that rules gave, once a minute: kept, explained, raised as alarms
+        chart_rules      run rules: which watch which chart, and how often each fires
+        baselines        baselines frozen on purpose, and the readings as points that they judge
         wear             true wear behind the corrections, remaining tool life, loops that hunt
         proof            published examples run through the live engine, beside the published results
     geometry         results of probed points

@@ -46,7 +46,7 @@ from app.plants import pages as plants_pages
 from app.plants.prefix import UnderPrefix
 from app.plants.serving import Application, Plants
 from app.quality.capability import actions as capability_actions
-from app.quality.control_charts import signals_actions
+from app.quality.chart_signals import jobs as signal_jobs
 from app.quality.proof import queries as proofs
 from app.quality.wear import actions as wear_actions
 from app.settings import Settings
@@ -84,9 +84,9 @@ WITH_ROUTES = """
     quality.proof.api quality.wear.api
     geometry.work_zero.api geometry.alignment.api geometry.alignment.pictures_api
     views.reports.api views.reports.jobs_api views.reports.points_api
-    quality.control_charts.api quality.control_charts.counts_api quality.control_charts.rules_api
+    quality.baselines.api quality.control_charts.api quality.count_charts.api quality.chart_rules.api
     quality.what_if.api quality.ledger.api quality.trial.api quality.sampling.api quality.temperature.api
-    quality.control_charts.signals_api
+    quality.chart_signals.api
     loop.readings.api:push
     views.search.readings_api
     loop.readings.aqdef.api loop.readings.table_api loop.readings.api loop.readings.by_hand.api loop.tools.api
@@ -107,9 +107,9 @@ WITH_ROUTES = """
     loop.connections.pages loop.connections.touch_tests.pages
     views.plant.pages views.plant.trying_pages views.station.pages views.search.pages views.to_do.pages
     views.wall.pages views.compare.pages views.overview.pages views.shift.pages views.characteristic.pages
-    quality.control_charts.pages quality.control_charts.counts_pages quality.control_charts.rules_pages
+    quality.control_charts.pages quality.baselines.pages quality.count_charts.pages quality.chart_rules.pages
     quality.what_if.pages quality.ledger.pages quality.trial.pages quality.sampling.pages
-    quality.temperature.pages quality.control_charts.signals_pages
+    quality.temperature.pages quality.chart_signals.pages
     views.characteristic.capability_pages
     views.characteristic.six_pack
     views.alarm_load.pages
@@ -147,7 +147,7 @@ JOBS: tuple[PeriodicJob, ...] = (
     present_context.JOB,  # before what looks for context that is missing
     control_plan_jobs.JOB,
     report_actions.JOB,
-    signals_actions.JOB,
+    signal_jobs.JOB,
     capability_actions.JOB,
     results_actions.JOB,
 )

@@ -28,8 +28,8 @@ from app.geometry.rotary_axes import form_reader as rotary_axes
 from app.geometry.work_zero import form_reader as work_zero
 from app.loop.programs import queries as programs
 from app.loop.readings.importing.layout import Wishes, look
-from app.quality.control_charts import form_reader as control_charts
-from app.quality.control_charts.counts_pages import typed
+from app.quality.baselines import form_reader as baselines
+from app.quality.count_charts.pages import typed
 from app.quality.gauge_studies import table_reader
 from app.web import forms
 
@@ -91,7 +91,7 @@ def test_what_is_made_of_a_cell(call: Callable[[str], Any]) -> None:
         lambda text: rotary_axes.run({"as": "positions", "positions": text}),
         results.read_results,
         forms.lengths,
-        control_charts.runs,
+        baselines.runs,
         lambda text: typed(text, ""),
         forms.whole_numbers,
         fits.fit_of,

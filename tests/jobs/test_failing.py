@@ -7,10 +7,10 @@ import pytest
 from sqlalchemy import text
 
 from app.jobs.actions import run_jobs
-from app.quality.control_charts.signals_actions import JOB
+from app.quality.chart_signals.jobs import JOB
 from tests.forked import inband
-from tests.quality.control_charts.line import Line
-from tests.quality.control_charts.rows import frozen
+from tests.quality.baselines.rows import frozen
+from tests.quality.chart_signals.line import Line
 from tests.shop import Shop
 
 pytestmark = pytest.mark.own_server  # it counts what fails in the whole plant

@@ -7,7 +7,7 @@ from tests.geometry.alignment.test_alignments import SIX
 from tests.geometry.geometric_form.test_forms import BORE
 from tests.geometry.rotary_axes.bench import axis
 from tests.pictures import as_json, picture
-from tests.quality.control_charts.line import Line
+from tests.quality.chart_signals.line import Line
 from tests.servers import Server
 from tests.shop import Shop
 from tests.waits import until

@@ -7,7 +7,7 @@ import httpx
 from app.views.reports.request import ReportRequest, SectionName
 from app.web.openapi import example_of
 from tests.geometry.rotary_axes.bench import axis
-from tests.quality.control_charts.line import Line
+from tests.quality.chart_signals.line import Line
 from tests.servers import Server
 from tests.shop import Shop
 from tests.views.reports.made_here import made_here

@@ -13,8 +13,8 @@ from app.core.spc.quoting import or_refused
 from app.core.spc.refusal import Floats, Refused
 from app.loop.summaries import queries as statistics
 from app.loop.summaries.queries import Window
+from app.quality.baselines.series_queries import read
 from app.quality.capability.queries import Singles, Study, moment
-from app.quality.control_charts.series_queries import read
 
 LOOKED_AT = 5000
 """The newest readings among which a run is looked for."""

@@ -43,10 +43,10 @@ from app.loop.characteristics import queries as characteristics
 from app.loop.characteristics.queries import CurrentCharacteristic
 from app.loop.summaries import queries as statistics
 from app.loop.summaries.queries import History, Window
+from app.quality.baselines import queries as control
+from app.quality.baselines.series_queries import read as read_series
 from app.quality.capability.kinds import SigmaBy
 from app.quality.capability.sigma_within import sigma_within
-from app.quality.control_charts import queries as control
-from app.quality.control_charts.series_queries import read as read_series
 
 __all__ = [
     "CONFIDENCE",

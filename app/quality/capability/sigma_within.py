@@ -8,8 +8,8 @@ from app.core.spc.shewhart import FEWEST_SUBGROUPS
 from app.core.spc.spread import Sigma, pooled, subgroups
 from app.loop.characteristics.queries import CurrentCharacteristic
 from app.loop.summaries.queries import History, Window
+from app.quality.baselines.series_queries import begin_of_runs, labels_of
 from app.quality.capability.kinds import SigmaBy
-from app.quality.control_charts.series_queries import begin_of_runs, labels_of
 
 
 def sigma_within(

@@ -1,1 +1,1 @@
-"""Control charts: baselines frozen on purpose, and the readings since judged by them."""
+"""Control charts: readings judged by a frozen baseline, drawn with the signals of the rules."""

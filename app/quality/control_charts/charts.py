@@ -25,12 +25,11 @@ from app.language.i18n import _
 from app.loop.characteristics.queries import CurrentCharacteristic
 from app.loop.summaries import queries as statistics
 from app.loop.summaries.queries import Window
-from app.quality.control_charts import queries
-from app.quality.control_charts.monitoring import Place
-from app.quality.control_charts.queries import LOOK_BACK, Charted, charted, judged_by, restarts
-from app.quality.control_charts.rules_queries import rules_in_force
-from app.quality.control_charts.series_queries import read
-from app.quality.control_charts.tables import Baseline
+from app.quality.baselines import queries
+from app.quality.baselines.queries import LOOK_BACK, Baseline, Charted, charted, judged_by, restarts
+from app.quality.baselines.series_queries import read
+from app.quality.chart_rules.places import Place
+from app.quality.chart_rules.queries import rules_in_force
 from app.quality.control_charts.view import Marks, View, only, since
 
 __all__ = ["Marks", "View", "kinds", "marked_by", "only", "unjudged", "unjudged_ranges", "view"]

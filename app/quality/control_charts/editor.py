@@ -13,11 +13,11 @@ from app.errors import Invalid
 from app.language.i18n import _
 from app.loop.characteristics.queries import CurrentCharacteristic
 from app.loop.summaries.queries import Window
+from app.quality.baselines.draft_queries import draft_of
+from app.quality.baselines.queries import Baseline
+from app.quality.baselines.schemas import ExcludedIn, PeriodIn
+from app.quality.baselines.series_queries import read
 from app.quality.control_charts import charts
-from app.quality.control_charts.drafts import draft_of
-from app.quality.control_charts.schemas import ExcludedIn, PeriodIn
-from app.quality.control_charts.series_queries import read
-from app.quality.control_charts.tables import Baseline
 from app.quality.control_charts.view import Marks, View
 from app.web.forms import parsed
 

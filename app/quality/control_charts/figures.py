@@ -17,10 +17,10 @@ from app.core.spc.rules import Signals
 from app.core.spc.shewhart import Chart as Shewhart
 from app.language.formatting import signed
 from app.language.i18n import _
+from app.quality.baselines.wording import axis
 from app.quality.control_charts.axis_range import UNSIGNED, beyond, reach
 from app.quality.control_charts.downsampling import thinned
 from app.quality.control_charts.view import Marks, View
-from app.quality.control_charts.wording import axis
 
 MOST_CHANGES = 40  # lines of tool changes; more are a fence
 WITH_MARKERS = 400

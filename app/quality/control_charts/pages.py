@@ -1,51 +1,42 @@
-"""Pages: the control charts of a characteristic with its baselines, and the editor that freezes one."""
+"""Page: the control charts of a characteristic with its baselines."""
 
-from collections.abc import Mapping
 from functools import cached_property
 from typing import Annotated, Any, Literal
 from urllib.parse import urlencode
 
 from fastapi import APIRouter, Header, Path, Query, Request, Response
 from sqlalchemy.orm import Session
-from starlette.datastructures import FormData, UploadFile
 from starlette.responses import RedirectResponse
 
 from app.access.deps import Caller, Engineer, Viewer
 from app.core.context import ContextField
-from app.core.spc.quantity import Quantity
 from app.core.spc.refusal import Reason as Why
 from app.core.spc.refusal import Refused
 from app.core.spc.rules import RuleName
 from app.core.spc.shewhart import FEWEST_READINGS, Chart
-from app.errors import Conflict, InbandError, Invalid
+from app.errors import InbandError
 from app.jobs.queries import failures_of
 from app.jobs.wording import with_job_words
 from app.loop.characteristics import queries as characteristics
 from app.loop.characteristics.queries import CurrentCharacteristic
 from app.loop.summaries import queries as statistics
 from app.loop.summaries import wording as statistics_wording
-from app.quality.control_charts import (
-    actions,
-    charts,
-    form_reader,
-    queries,
-    rules_wording,
-    signals_queries,
-    signals_wording,
-    wording,
-)
+from app.quality.baselines import actions, queries, wording
+from app.quality.baselines.draft_queries import suited
+from app.quality.baselines.queries import Baseline
+from app.quality.chart_rules import wording as rules_wording
+from app.quality.chart_signals import queries as signals_queries
+from app.quality.chart_signals import wording as signals_wording
+from app.quality.chart_signals.queries import SignalRow
+from app.quality.control_charts import charts
 from app.quality.control_charts.answers import signals_out
-from app.quality.control_charts.drafts import Draft, draft_of, suited
-from app.quality.control_charts.schemas import BaselineIn, ChartSignalOut, PeriodIn
-from app.quality.control_charts.signals_queries import SignalRow
-from app.quality.control_charts.tables import Baseline
+from app.quality.control_charts.schemas import ChartSignalOut
 from app.quality.control_charts.view import View
 from app.quality.proof import queries as proof
 from app.quality.proof import wording as proof_wording
 from app.web.choice import Choice, ChosenOnPage
-from app.web.deps import FormDep, SessionDep, texts
+from app.web.deps import FormDep, SessionDep
 from app.web.fields import LARGEST_SERIAL, Reason
-from app.web.forms import parsed
 from app.web.templates import page
 from app.web.validation import checked
 
@@ -211,103 +202,6 @@ def _control(
         may_freeze=caller.may("engineer"),
         wanted=lambda name: part is None or part == name,
     )
-
-
-@router.get("/characteristics/{characteristic}/control/freeze")
-def freeze_page(
-    request: Request, session: SessionDep, caller: Engineer, characteristic: str, choice: ChosenOnPage
-) -> Response:
-    """Choose a period, see what its baseline would be, and freeze it. What is chosen is in the address."""
-    del caller
-    current = characteristics.characteristic_named(session, characteristic)
-    return _freeze(request, session, current, choice, texts_of(request))
-
-
-def texts_of(request: Request) -> dict[str, str]:
-    """The text fields of the address."""
-    return texts(FormData(list[tuple[str, str | UploadFile]](request.query_params.multi_items())))
-
-
-def _freeze(
-    request: Request,
-    session: Session,
-    current: CurrentCharacteristic,
-    choice: Choice,
-    form: Mapping[str, str],
-    error: Invalid | Conflict | None = None,
-) -> Response:
-    key = current.characteristic.key
-    suits = suited(session, current)
-    draft: Draft | None = None
-    chosen = bool(form.get("first_sequence") or form.get("last_sequence"))
-    typed = (
-        form_reader.begun(None) | {"quantity": suits.value, "chart": "individuals", "ewma_exact": "true"} | dict(form)
-    )
-    if chosen:
-        try:
-            draft = draft_of(session, current, parsed(PeriodIn, form_reader.period(typed)))
-        except Invalid as wrong:
-            error = error or wrong
-    return page(
-        request,
-        "control_charts/freeze.html",
-        refusal=error,
-        machine=current.machine,
-        characteristic=current.characteristic,
-        choice=choice,
-        draft=draft,
-        seen_version=queries.newest_version(session, current.characteristic),
-        suits=suits,
-        typed=typed,
-        fields=form_reader.FIELDS,
-        limits_said=any(name.startswith("limits.") and text for name, text in typed.items()),
-        errors=form_reader.at_fields(error) if error else {},
-        quantities=list(Quantity),
-        figure=f"/api/v1/characteristics/{key}/figures/baseline?{urlencode(_pictured(typed, choice))}",
-        link=lambda last: f"/characteristics/{key}/control/freeze?{urlencode({**form, 'last': last})}",
-        wording=wording,
-        said=statistics_wording,
-        proof_failing=proof.failing(),
-        proof_warning=proof_wording.warning(len(proof.failing())),
-    )
-
-
-def _pictured(typed: Mapping[str, str], choice: Choice) -> dict[str, Any]:
-    """Request for the picture: as much of the form as can be understood."""
-    try:
-        period = parsed(PeriodIn, form_reader.period(typed))
-    except Invalid:
-        known = typed.get("quantity") in set(Quantity)
-        return choice.query | ({"quantity": typed["quantity"]} if known else {})
-    names = ("chart", "grouping", "group_size", "group_pause", "settle", "first_sequence", "last_sequence")
-    pooled = {"pooled": "true"} if period.pooled else {}
-    values = (
-        {name: getattr(period, name) for name in names}
-        | pooled
-        | ({} if period.limits is None else period.limits.model_dump())
-        | {
-            "quantity": period.quantity.value,
-            "excluded": ",".join(f"{run.first}-{run.last}" for run in period.excluded),
-        }
-    )
-    return choice.query | {name: value for name, value in values.items() if value not in (None, "")}
-
-
-@router.post("/characteristics/{characteristic}/control/freeze")
-def freeze(
-    request: Request, session: SessionDep, caller: Engineer, characteristic: str, choice: ChosenOnPage, form: FormDep
-) -> Response:
-    """Freeze what was previewed, with a reason."""
-    current = characteristics.characteristic_named(session, characteristic)
-    try:
-        with session.begin_nested():
-            seen = form.get("seen_version", "")
-            seen_version = int(seen) if seen.isdecimal() and len(seen) < 10 else None
-            more = {"reason": form.get("reason"), "seen_version": seen_version}
-            actions.freeze(session, current, parsed(BaselineIn, form_reader.period(form) | more), caller)
-    except (Invalid, Conflict) as error:
-        return _freeze(request, session, current, choice, form, error)
-    return RedirectResponse(f"/characteristics/{current.characteristic.key}/control", 303)
 
 
 @router.post("/characteristics/{characteristic}/control/baselines/{version}/{what}")

@@ -10,7 +10,7 @@ from app.core.spc.quantity import Quantity
 from app.core.spc.refusal import Floats
 from app.core.spc.rules import Signals
 from app.core.spc.shewhart import Chart
-from app.quality.control_charts.series_queries import LeftOut
+from app.quality.baselines.series_queries import LeftOut
 
 Whole = NDArray[np.int64]
 

@@ -12,7 +12,7 @@ from app.loop.characteristics.queries import CurrentCharacteristic
 from app.loop.control_plan import queries as plans
 from app.loop.summaries import queries as statistics
 from app.quality.capability.queries import judgement_of
-from app.quality.control_charts import signals_queries as signals
+from app.quality.chart_signals import queries as signals
 from app.quality.wear import queries as wears
 
 USUAL = 1_000  # readings, the newest

@@ -15,8 +15,8 @@ from app.loop.characteristics.queries import CurrentCharacteristic
 from app.loop.expansion.queries import expansion_of, temperatures_between
 from app.loop.summaries import queries as statistics
 from app.loop.summaries.queries import Window
-from app.quality.control_charts.series_queries import ReadingSeries, read
-from app.quality.control_charts.tables import Baseline
+from app.quality.baselines.series_queries import ReadingSeries, read
+from app.quality.baselines.tables import Baseline
 
 USUAL, MOST = 2_000, 20_000  # readings, the newest
 Body = Literal["part", "machine"]

@@ -39,7 +39,7 @@ from app.loop.characteristics.queries import CurrentCharacteristic
 from app.loop.summaries import queries as statistics
 from app.loop.summaries.queries import History, Window
 from app.loop.tables.tools import ToolEvent
-from app.quality.control_charts import queries as control_charts
+from app.quality.baselines import queries as baselines
 
 LARGEST = 1_000_000  # readings in one replay
 MOST_FOLLOWED = 2_000  # corrections that tell of the delay by the offset
@@ -300,7 +300,7 @@ def _joined(
 
 
 def _baseline(session: Session, current: CurrentCharacteristic) -> int | None:
-    baseline = control_charts.baseline_in_force(session, current.characteristic)
+    baseline = baselines.baseline_in_force(session, current.characteristic)
     return baseline.version if baseline is not None and baseline.quantity == "deviation" else None
 
 

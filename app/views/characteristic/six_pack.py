@@ -33,14 +33,14 @@ from app.language.formatting import signed
 from app.language.i18n import _
 from app.loop.characteristics import queries as characteristics
 from app.loop.characteristics.queries import CurrentCharacteristic
+from app.quality.baselines import queries as controls
+from app.quality.baselines import wording as control_wording
 from app.quality.capability import figures, wording
 from app.quality.capability.chart import drawn
 from app.quality.capability.pictures import interval
 from app.quality.capability.queries import USUAL, Study
 from app.quality.capability.request import StudyRequest, study_of
 from app.quality.control_charts import charts
-from app.quality.control_charts import queries as controls
-from app.quality.control_charts import wording as control_wording
 from app.quality.control_charts.figures import control_figure
 from app.quality.proof import queries as proof
 from app.quality.proof import wording as proof_wording

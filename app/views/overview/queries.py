@@ -17,7 +17,7 @@ from app.loop.tables.machines import Machine
 from app.loop.tables.readings import Reading, Stream
 from app.quality.capability import verdict_queries as verdicts
 from app.quality.capability.verdict_queries import Verdict
-from app.quality.control_charts import signals_queries as signals
+from app.quality.chart_signals import queries as signals
 from app.views.characteristic import state_queries as plant
 from app.views.characteristic.state_queries import CharacteristicRow
 from app.views.overview.ranking import AttentionInputs

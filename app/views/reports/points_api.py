@@ -14,7 +14,8 @@ from app.files.documents.content import Format
 from app.files.documents.files import MEDIA_TYPES
 from app.loop.characteristics import queries as characteristics
 from app.loop.summaries import queries as statistics
-from app.quality.control_charts import charts, queries
+from app.quality.baselines import queries
+from app.quality.control_charts import charts
 from app.quality.control_charts.charts import View
 from app.web.api import CharacteristicKey, api_router, problems
 from app.web.choice import Chosen

@@ -16,13 +16,13 @@ from app.core.spc.rules import RULES, RuleName, signals
 from app.core.spc.shewhart import Chart
 from app.loop.characteristics.queries import CurrentCharacteristic, characteristic_named
 from app.loop.summaries.queries import Window
+from app.quality.baselines.queries import Charted, baseline_in_force, charted
+from app.quality.baselines.tables import Baseline
 from app.quality.control_charts import charts, figures
 from app.quality.control_charts.downsampling import MOST_POINTS, STRETCHES, thinned
-from app.quality.control_charts.queries import Charted, baseline_in_force, charted
-from app.quality.control_charts.tables import Baseline
 from app.quality.control_charts.view import View
 from tests.chance import examples
-from tests.quality.control_charts.rows import frozen
+from tests.quality.baselines.rows import frozen
 from tests.shop import Shop
 
 BASELINES: list[dict[str, Any]] = [

@@ -6,8 +6,8 @@ from typing import Any
 
 import pytest
 
+from tests.quality.baselines.rows import control, frozen
 from tests.quality.closed_loop import cut, scatter
-from tests.quality.control_charts.rows import control, frozen
 from tests.servers import Server
 from tests.shop import Person, Shop
 

@@ -10,8 +10,8 @@ import pytest
 
 from app.quality.what_if.tool_history import Delays, _delays
 from tests.loop.readings.importing.test_history import run, table
+from tests.quality.baselines.rows import frozen
 from tests.quality.closed_loop import cut, scatter
-from tests.quality.control_charts.rows import frozen
 from tests.servers import Server
 from tests.shop import Person, Shop
 

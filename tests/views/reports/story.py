@@ -4,7 +4,7 @@ from random import Random
 from typing import Any
 
 from app.jobs.actions import run_jobs
-from app.quality.control_charts.signals_actions import JOB
+from app.quality.chart_signals.jobs import JOB
 from tests.shop import Shop
 
 PERIOD = "last=all"

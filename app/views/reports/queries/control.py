@@ -27,13 +27,15 @@ from app.files.documents.content import (
 from app.language.i18n import _
 from app.loop.summaries.wording import estimator
 from app.loop.timeline import queries as timeline
-from app.quality.control_charts import charts, signals_queries, wording
-from app.quality.control_charts import queries as controls
-from app.quality.control_charts import signals_wording as signals
+from app.quality.baselines import queries as controls
+from app.quality.baselines import wording
+from app.quality.baselines.tables import Baseline
+from app.quality.chart_signals import queries as signals_queries
+from app.quality.chart_signals import wording as signals
+from app.quality.chart_signals.queries import SignalRow
+from app.quality.control_charts import charts
 from app.quality.control_charts.charts import View, only
 from app.quality.control_charts.figures import control_figure
-from app.quality.control_charts.signals_queries import SignalRow
-from app.quality.control_charts.tables import Baseline
 from app.views.reports.queries.frame import Frame
 
 MOST_ROWS = 100

@@ -5,11 +5,11 @@ from functools import partial
 from app.core.spc.refusal import Refused
 from app.files.documents.content import Column, Fact, Picture, Section, Table, count, deviation, number, width, words
 from app.language.i18n import _
+from app.quality.baselines import queries as controls
 from app.quality.capability import wording
 from app.quality.capability.chart import drawn
 from app.quality.capability.figures import histogram, small
 from app.quality.capability.queries import Study
-from app.quality.control_charts import queries as controls
 from app.views.reports.queries.capability import verdict
 from app.views.reports.queries.charts import zones
 from app.views.reports.queries.frame import Frame

@@ -1,0 +1,1 @@
+"""Baselines: what readings are judged by, frozen on purpose, and the readings as the points that they judge."""

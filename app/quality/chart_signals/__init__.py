@@ -1,0 +1,1 @@
+"""Signals that run rules gave: kept, explained, and raised as alarms."""

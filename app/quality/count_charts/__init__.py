@@ -1,0 +1,1 @@
+"""Charts of counts that are typed or sent: p, np, c and u. Nothing is stored."""
