@@ -37,7 +37,7 @@ only through each other's queries and actions. frontend/ and migrations/ lie bes
         gauge_studies    Cg, R&R, linearity, bias, and their advice for R33
         capability       Cp to Ppk with intervals, normality, behaviour in time, the process without its corrections
         control_charts   control charts by frozen baselines, with the signals of run rules
-        count_charts     charts of counts: p, np, c, u; nothing is stored
+        count_charts     charts of counts, such as p, np, c and u; nothing is stored
         chart_signals    signals that rules gave, once a minute: kept, explained, raised as alarms
         chart_rules      run rules: which watch which chart, and how often each fires
         baselines        baselines frozen on purpose, and the readings as points that they judge

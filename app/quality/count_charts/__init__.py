@@ -1,1 +1,1 @@
-"""Charts of counts that are typed or sent: p, np, c and u. Nothing is stored."""
+"""Charts of counts that are typed or sent, such as p, np, c and u. Nothing is stored."""
