@@ -142,7 +142,7 @@ def add_member(
             person = queries.person_named(session, name)
         if person is None:
             raise NotFound(
-                f"Nobody called {name} signs in to {here.name}.", "Look at the people there: Set-up, People."
+                f"No person named {name} signs in to {here.name}.", "Look at the people there: Set-up, People."
             )
         with opened(in_schema(url, there.schema), settings) as database, database.begin() as session:
             actions.add_person_of_another_plant(session, person, role.value, actor())

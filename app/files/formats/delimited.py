@@ -207,7 +207,9 @@ def even(rows: Iterable[Row], width: int, delimiter: str, *, complete: bool = Tr
 
 def _even(row: Row, width: int, delimiter: str) -> Row | Unusable:
     if delimiter == BLANKS and len(row.cells) != width:
-        words = _("has {cells} cells between blanks, the header has {width}: nobody can tell which of them is empty")
+        words = _(
+            "has {cells} cells between blanks, the header has {width}: it cannot be determined which of them is empty"
+        )
         return Unusable(words.format(cells=len(row.cells), width=width), row.line)
     if any(cell.strip() for cell in row.cells[width:]):
         return Unusable(_too_wide(len(row.cells), width, delimiter), row.line)

@@ -64,7 +64,7 @@ def agreed_unit(unit: str | None, *words: Any) -> str | None:
             )
         if unit is not None and said != unit:
             raise Unreadable(
-                _("is in {said}, its column or row says {unit}: nobody can tell which counts").format(
+                _("is in {said}, its column or row says {unit}: it cannot be determined which counts").format(
                     said=said, unit=unit
                 )
             )

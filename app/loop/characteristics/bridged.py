@@ -27,8 +27,8 @@ def _uncarried(current: CurrentCharacteristic, corrected: Sequence[Mapping[str, 
     code = "not_mapped"
     if not corrected:
         text = _(
-            "The bridge of this machine carries no corrections: those of tool memory {value} wait here until somebody enters them at "
-            "the control and confirms them. If nobody will, set the mode to measure_only"
+            "The bridge of this machine carries no corrections: those of tool memory {value} wait here until they are entered at "
+            "the control and confirmed. If they will not be, set the mode to measure_only"
         )
     elif location is None:
         text = _(

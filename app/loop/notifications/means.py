@@ -185,7 +185,7 @@ def _introduced(server: smtplib.SMTP, settings: Settings) -> None:
         if settings.mail_user:
             _sign_in(server, settings.mail_user, settings.mail_password or "")
     except smtplib.SMTPNotSupportedError:
-        reason = _("{server} lets nobody sign in this way: is INBAND_MAIL_USER needed, and INBAND_MAIL_SECURITY right?")
+        reason = _("{server} allows no sign-in this way: is INBAND_MAIL_USER needed, and INBAND_MAIL_SECURITY right?")
         raise Refused(reason.format(server=settings.mail_server)) from None
 
 

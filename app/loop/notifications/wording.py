@@ -44,7 +44,7 @@ def tones() -> list[tuple[str, str]]:
     return [
         ("stop", _("Stop: the machine must not go on")),
         ("wear", _("Wear: a tool has to be changed")),
-        ("attention", _("Attention: somebody has to look")),
+        ("attention", _("Attention: needs a look")),
         ("waiting", _("Waiting: not urgent")),
         ("steady", _("For information")),
     ]

@@ -86,7 +86,7 @@ def note(said: Note) -> str:
         "unit_inch": _("{word}: lengths are in inches from here on, and become mm"),
         "unit_mm": _("{word}: lengths are in mm"),
         "unit_mixed": _(
-            "{r} is left out: the unit changes in this program, and nobody can tell whether it is inch or mm. Say one unit "
+            "{r} is left out: the unit changes in this program, and it cannot be determined whether it is inch or mm. Say one unit "
             "before the first length"
         ),
         "from_inch": _("The lengths were in inches; here they are mm"),

@@ -207,7 +207,7 @@ _SENTENCES: dict[str, Callable[[], str]] = {
         "Deviation %(deviation)s: this characteristic is only measured, nothing is corrected."
     ),
     Code.OFFSET_BY_HAND: lambda: _(
-        "Deviation %(deviation)s: somebody has set the offset of this tool since it was changed, and nobody knows how much "
+        "Deviation %(deviation)s: the offset of this tool was set by hand since it was changed, and it is not known how much "
         "of the size of the tool is in it. Nothing is corrected until the tool change is reported."
     ),
     Code.IMPORTED: lambda: _(

@@ -68,7 +68,7 @@ OFFSET_DIFFERS = register(
                 _("Tool was changed"),
                 _("Typed in by mistake"),
                 _("Program was loaded"),
-                _("Nobody knows"),
+                _("Not known"),
             ]
         },
     )

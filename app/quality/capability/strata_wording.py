@@ -15,7 +15,7 @@ def answer_words(found: StrataStudy) -> str:
             return _("There are no two of them to compare.")
         case NoAnswer.APART:
             return _(
-                "They were made one after the other: nobody can tell what differs between them from what drifted meanwhile. It takes "
+                "They were made one after the other: it cannot be determined what differs between them from what drifted meanwhile. It takes "
                 "readings of several of them side by side, in five places and more."
             )
         case NoAnswer.NO_VARIATION:

@@ -53,8 +53,8 @@ def too_few(refused: Refused) -> str:
 def unknown(count: int) -> str:
     """The number of readings that are left out because their corrections are not known."""
     return ngettext(
-        "%(num)s reading is left out: nobody knows with which corrections its part was cut.",
-        "%(num)s readings are left out: nobody knows with which corrections their parts were cut.",
+        "%(num)s reading is left out: it is not known with which corrections its part was cut.",
+        "%(num)s readings are left out: it is not known with which corrections their parts were cut.",
         count,
     ) % {"num": count}
 
@@ -145,6 +145,6 @@ def _doubts(study: Study, drift: Drift) -> list[str]:
     if study.unknown:
         said.append(unknown(study.unknown))
     if not study.rebuilt:
-        said.append(_("Nobody knows which corrections these parts were cut with: sizes are taken as they came out."))
+        said.append(_("It is not known which corrections these parts were cut with: sizes are taken as they came out."))
     said.append(_("What changes together need not be cause and effect."))
     return said

@@ -73,9 +73,7 @@ def start_correcting(on: OfTrial, given: StartIn) -> CurrentCharacteristic:
 
 def _follows(on: OfTrial) -> list[str]:
     sentences = [
-        _("From the next reading on corrections of tool {tool} go to the machine, without asking anybody.").format(
-            **on.values
-        )
+        _("From the next reading on corrections of tool {tool} go to the machine, without asking.").format(**on.values)
     ]
     if on.settings is not None:
         sentences.append(

@@ -156,7 +156,7 @@ def _limits(
         found = _kind(layout.named(side), nominal, votes, own)
         sizes.append(value if found is _Limits.SIZES else round((nominal or 0.0) + value, 9))
     if lower is not None and upper is not None and lower > 0 and sizes[0] != lower:
-        words = _("its {column} is above 0: a deviation, or one without its sign? Nobody can tell")
+        words = _("its {column} is above 0: a deviation, or one without its sign? It cannot be determined")
         raise _Wrong(words.format(column=layout.named("lower")))
     return nominal, sizes[0], sizes[1]
 
@@ -173,9 +173,11 @@ def _kind(column: str, nominal: float | None, votes: dict[_Limits, _Vote], own: 
         return _agreed(votes, own, column)
     found = _Limits.SIZES if sizes else _Limits.DEVIATIONS
     if own is not None and own.limits is not found:
-        words = _("its {column} is a deviation by its name, and near the nominal size: a size? Nobody can tell")
+        words = _("its {column} is a deviation by its name, and near the nominal size: a size? It cannot be determined")
         if sizes:
-            words = _("its {column} is a size by its name, and far from the nominal size: a deviation? Nobody can tell")
+            words = _(
+                "its {column} is a size by its name, and far from the nominal size: a deviation? It cannot be determined"
+            )
         raise _Wrong(words.format(column=column))
     return found
 

@@ -131,7 +131,7 @@ class Layout:
     def refuse_doubt(self) -> None:
         """Refuse to take sizes of an uncertain unit for millimetres. Raises `Invalid`."""
         if self.doubt:
-            words = _("The lines above the table name the unit {unit}, and nobody can tell of which numbers.")
+            words = _("The lines above the table name the unit {unit}, and it cannot be determined of which numbers.")
             what = _("Say in which unit the numbers of the table are: {units}.").format(units=", ".join(LENGTHS))
             raise wrong("unit", f"{words.format(unit=self.doubt)} {what}")
 

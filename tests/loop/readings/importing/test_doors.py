@@ -205,7 +205,7 @@ TABLES = {
         morning(39.99992, 40.000936),
         column="D40 inches",
     ),
-    "title of some unit": Case("Tolerances in µm\n" + THREE, words="nobody can tell", whole=True),
+    "title of some unit": Case("Tolerances in µm\n" + THREE, words="cannot be determined of which", whole=True),
     "title of a part of a unit": Case("Alle Maße in 1/1000 mm\n" + THREE, words="1/1000 mm", whole=True),
     "title of a length that is not known": Case("All dimensions in feet\n" + THREE, words="feet", whole=True),
     "part of a unit": Case(

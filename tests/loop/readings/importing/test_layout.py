@@ -350,7 +350,7 @@ def test_columns_aligned_by_blanks_are_read_and_nothing_is_shifted(tmp_path: Pat
     found = read(write(tmp_path, TABLE), delimiter=BLANKS, mapping={"measured": "Meas D"})
     assert [each.reading.measured for each in found if isinstance(each, Line)] == [2.176, 2.171]
     assert [str(each) for each in found if isinstance(each, Flaw)] == [
-        "line 6: has 2 cells between blanks, the header has 3: nobody can tell which of them is empty"
+        "line 6: has 2 cells between blanks, the header has 3: it cannot be determined which of them is empty"
     ]
 
 

@@ -20,7 +20,7 @@ from tests.loop.readings.importing.doors import bridged
 
 Answer = list[float] | str
 """Sizes, mm, or words of the refusal."""
-NO_LENGTH, NOBODY = "which is no length that is known", "nobody can tell which counts"
+NO_LENGTH, NOBODY = "which is no length that is known", "it cannot be determined which counts"
 
 ROWS: dict[str, tuple[str, list[tuple[str, str]], Answer]] = {
     "a column of units": ("actual", [("0.4724", "inch"), ("12.003", "mm"), ("12.001", "")], [11.99896, 12.003, 12.001]),
@@ -148,7 +148,7 @@ def test_a_column_that_is_called_so_and_holds_no_units_can_be_left_out(tmp_path:
         ({"v": 25.1, "unit": "Nm"}, {"measured": "v"}, NO_LENGTH),
         ({"d": {"v [µm]": 12345}}, {"measured": "d.v [µm]"}, 12.345),
         ({"v_inch": 0.4724}, {"measured": "v_inch"}, 11.99896),
-        ({"v_inch": 0.4724, "unit": "mm"}, {"measured": "v_inch"}, "nobody can tell which counts"),
+        ({"v_inch": 0.4724, "unit": "mm"}, {"measured": "v_inch"}, "it cannot be determined which counts"),
         ({"v [Nm]": 25.1}, {"measured": "v [Nm]"}, "unit Nm, in the name of the member, is no length"),
     ],
 )
