@@ -158,7 +158,7 @@ def untimes_wording(
 def unit_in_doubt(word: str) -> str:
     """The reason against sizes whose header, or a line above it, names a unit that cannot be taken."""
     return (
-        f"the header, or a line above it, names the unit {word}: nobody can tell of which sizes, or it is no length that is known "
+        f"the header, or a line above it, names the unit {word}: it cannot be determined of which sizes, or it is no length that is known "
         f"({', '.join(LENGTHS)}). Name the unit in the header of the column, or set unit under the machine's folder."
     )
 

@@ -82,7 +82,7 @@ def own_reading(payload: bytes, characteristics: Mapping[str, str], form: Form) 
         key, said = "", None
     fault = _fault(body)
     if fault is None and not key:
-        fault = f"The reading has no key of 1 to {LONGEST_KEY} characters: without one nobody can tell a repeat from a reading."
+        fault = f"The reading has no key of 1 to {LONGEST_KEY} characters: without one a repeat cannot be distinguished from a reading."
     if fault is not None:
         return Found(key or None, said, body, fault)
     content = {name: value for name, value in body.items() if value is not None and name != "key"}
@@ -179,9 +179,7 @@ def _mapped(
             yield Found(None, None, {}, f"{wrong} {words}.")
             continue
         if said is None and not body.keys() & {"measured_at", "machined_at", "part"}:
-            words = (
-                "The reading has no key, no time and no part: nobody can tell a repeat from a reading. Map one of them."
-            )
+            words = "The reading has no key, no time and no part: a repeat cannot be distinguished from a reading. Map one of them."
             yield Found(None, None, {}, words)
             continue
         first = str(said) if said is not None else f"{machine}:{_digest(payload)}"
