@@ -23,6 +23,7 @@ from app.core.compile_now import compile_each
 from app.db.connections import Connections
 from app.db.engine import Database
 from app.db.replica import replica_of
+from app.files.formats.rotary_words import known_words
 from app.jobs.actions import PeriodicJob
 from app.jobs.runner import JobRunner
 from app.language.times import use_zone
@@ -188,6 +189,7 @@ def create_app(settings: Settings | None = None, ending: Callable[[], None] = la
     if settings.database_url is None:
         raise RuntimeError("no database: `inband serve` starts one, or set INBAND_DATABASE_URL")
     use_zone(settings)
+    known_words(settings.rotary_words)
     front = FastAPI(docs_url=None, redoc_url=None, openapi_url=None, redirect_slashes=False)
     front.state.settings = settings
     add_problem_handlers(front, _nobody)

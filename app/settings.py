@@ -225,6 +225,10 @@ class Settings(BaseSettings):
         le=60,
         description="Seconds that a request waits for a database that does not answer, before it gets 503.",
     )
+    rotary_words: Path | None = Field(
+        default=None,
+        description="File (TOML) with words of the protocols of rotary axes, beside those that Inband knows.",
+    )
     session_hours: int = Field(default=12, ge=1, le=24 * 31, description="Hours until a browser must sign in again.")
 
     bridge_silent_after: float = Field(

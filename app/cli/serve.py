@@ -87,9 +87,11 @@ def run(
     signal.signal(signal.SIGTERM, _end)  # from the first moment on, so that the database is always ended in order
     from app.db.connections import in_schema
     from app.db.migrate import current
+    from app.files.formats.rotary_words import known_words
     from app.plants.serving import settings_of
     from app.web.protocol import raise_file_limit
 
+    known_words(settings.rotary_words)
     raise_file_limit()
     with _listen(settings) as listening, ExitStack() as stack:
         _keep_compiled(settings.data_dir)

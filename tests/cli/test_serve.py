@@ -324,6 +324,20 @@ def test_wrong_use_is_refused_with_status_2(arguments: list[str], words: str) ->
     assert "hunter2" not in done.stderr
 
 
+def test_words_of_rotary_axes_that_contradict_are_refused_before_anything_is_begun(tmp_path: Path) -> None:
+    (tmp_path / "words.toml").write_text('[backlash]\nlabels = ["Startwinkel"]')
+    for name, words in (
+        ("words.toml", "[backlash] “Startwinkel” is known as [start_angle] already"),
+        ("x", "cannot be read"),
+    ):
+        path = str(tmp_path / name)
+        done = inband("serve", "--data-dir", str(tmp_path / "data"), INBAND_ROTARY_WORDS=path)
+        assert (done.returncode, done.stdout) == (1, "")
+        assert f"INBAND_ROTARY_WORDS: {path}: {words}" in done.stderr
+        assert "Traceback" not in done.stderr
+        assert not (tmp_path / "data").exists()
+
+
 def test_every_option_has_its_variable(new_database: NewDatabase) -> None:
     url = new_database()
     done = inband("check", INBAND_DATABASE_URL=url, INBAND_PORT="8123")

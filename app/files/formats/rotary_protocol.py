@@ -1,4 +1,4 @@
-"""The protocol that a control writes after cycle 451 or 452 (TCHPRAUTO.html), read by its labels: German, English, Slovene.
+"""The protocol that a control writes after cycle 451 or 452 (TCHPRAUTO.html), read by its labels: see `rotary_words`.
 
 The labels are those of the cycle's manual; controls and versions word them differently, so what is not understood is
 handed back line by line. Lengths become mm, angles degrees. Nothing raises.
@@ -14,16 +14,10 @@ from app.core.rotary.axis import ERRORS, AxisName
 from app.core.rotary.results import SCALARS, STRINGS
 from app.files.formats.cell_values import folded
 from app.files.formats.markup import Row, rows_of
-from app.files.formats.rotary_stems import EARLIER, fits, meaning
-from app.files.formats.rotary_words import AXIS_KEYS, HEAD_KEYS, LABELS, OPTIMISED, WORTHLESS
+from app.files.formats.rotary_words import AXIS_KEYS, HEAD_KEYS, LONGEST_LABEL, Words, fits, known_words
 
 LARGEST = 1e6
-LONGEST_LABEL = 120
 FEW = 20  # lines that may be not understood whatever else there is
-_AXIS = re.compile(
-    r"\b(?:[a-z]{0,20}achse|[a-z]{0,20}tisch|axis(?: of rotation)?|rotary table|os|osi|miza)\s+([abc])\b"
-    r"|\b([abc])\s?(?:[a-z]{0,20}achse|axis|rotary axis|os|osi)\b"
-)
 # 1.212,3344 with a mark for the thousands and 1.2e-05 are no numbers here: half of one would be another one.
 _NUMBER = re.compile(
     r"(?:(?<![\w.,+-])|(?<=,)(?=[+-]))([+-]?\d{1,12}(?:[.,]\d{1,12})?)(?![.,]?\d)\s*(mm|um|µm|μm|°|deg|grad|inch|in|\")?(?![\w])"
@@ -35,7 +29,6 @@ _LAST_WORD = re.compile(r"[^\W\d]\)?\Z")
 _VALUE = re.compile(r"[+\N{MINUS SIGN}-]?\d")
 _THOUSANDS = re.compile(r"\d[ '’]\d{3}(?!\d)")
 _CLOCK = re.compile(r"\d{1,2}:\d{2}")
-_ALONE = re.compile(r"(?:[a-z]{1,20} ){0,2}(?:[a-z]{0,20}achse|axis|os)(?: of rotation)?")  # Vermessene Rotationsachse
 _LETTER = re.compile(r"\s*([abc])(?:[\s-]*(?:achse|axis|os))?\s*", re.IGNORECASE)
 _ERROR = re.compile(
     r"\b(E[XYZABC]0[ABC])\b\s*+[=:]?\s*+([+-]?\d{1,6}(?:[.,]\d{1,12})?)\s*(mm|um|µm|μm|°|deg|grad)?(?![\w.,]*\w)",
@@ -50,10 +43,11 @@ Point = tuple[float, float, float]
 
 
 class Unread(NamedTuple):
-    """A line of the protocol that was not understood."""
+    """A line of the protocol that was not understood. label: what comes before its value, as printed."""
 
     line: int
     text: str
+    label: str = ""
 
 
 class Deviation(NamedTuple):
@@ -94,13 +88,14 @@ class Protocol:
         return not self.head and len(self.unread) > max(FEW, self.rows / 2)
 
 
-def read_protocol(text: str) -> Protocol:
-    """Read a protocol.
+def read_protocol(text: str, known: Words | None = None) -> Protocol:
+    """Read a protocol. known: the words, if not only those of Inband.
 
     >>> protocol = read_protocol("<h2>C-Achse</h2><table><tr><td>Lose</td><td>0,0021 °</td></tr></table>")
     >>> protocol.axes["C"].numbers
     {'backlash': 0.0021}
     """
+    known = known or known_words()
     protocol = Protocol()
     rows, broken = rows_of(text.removeprefix("\ufeff"))
     protocol.rows = len(rows)
@@ -109,37 +104,35 @@ def read_protocol(text: str) -> Protocol:
     columns: list[tuple[str, int]] = []
     side_by_side: list[AxisName] = []
     for row in rows:
-        label, values = _split(row)
-        words = folded(label[:LONGEST_LABEL])
-        named = _AXIS.search(words)
-        if named is not None:
-            axis = _axis_of(named)
+        label, values = _split(row, known)
+        named, words = known.without_axis(folded(label[:LONGEST_LABEL]))
+        if named:
+            axis = _named(named)
             protocol.axes.setdefault(axis, AxisProtocol())
-            words = " ".join(_AXIS.sub(" ", words).split())
-        elif letter := _LETTER.fullmatch(_heading(words, label, values)):
+        elif letter := _LETTER.fullmatch(_heading(words, label, values, known)):
             axis = _named(letter[1])
             continue
         if abreast := _abreast(row):
             side_by_side, columns = abreast, []
             continue
-        if columns_found := _columns(row):
+        if columns_found := _columns(row, known):
             axis, columns = columns_found
             continue
         if columns and axis is not None and _deviation(protocol, axis, columns, row):
             continue
         columns = []
-        if not values and (words in WORTHLESS or WORTHLESS.issuperset(words.split()) or _CYCLE.search(words)):
+        if not values and (known.is_title(words) or _CYCLE.search(words)):
             continue
         if side_by_side and len(values) == len(side_by_side):
             understood = [
-                _take(protocol, axis_of_value, words, label, [value])
+                _take(protocol, known, axis_of_value, words, label, [value])
                 for axis_of_value, value in zip(side_by_side, values, strict=True)
             ]
             if not all(understood):
-                protocol.unread.append(Unread(row.line, row.text[:200]))
+                protocol.unread.append(Unread(row.line, row.text[:200], label[:LONGEST_LABEL]))
             continue
-        if not _take(protocol, axis, words, label, values):
-            protocol.unread.append(Unread(row.line, row.text[:200]))
+        if not _take(protocol, known, axis, words, label, values):
+            protocol.unread.append(Unread(row.line, row.text[:200], label[:LONGEST_LABEL]))
     protocol.axes = {
         axis: columns_found for axis, columns_found in protocol.axes.items() if columns_found != AxisProtocol()
     }
@@ -147,7 +140,7 @@ def read_protocol(text: str) -> Protocol:
     return protocol
 
 
-def _split(row: Row) -> tuple[str, list[str]]:
+def _split(row: Row, known: Words) -> tuple[str, list[str]]:
     if len(row.cells) > 1:
         return row.cells[0].rstrip(":= "), list(row.cells[1:])
     text = row.cells[0]
@@ -156,7 +149,7 @@ def _split(row: Row) -> tuple[str, list[str]]:
         at = text.find(mark)
         if at > 0 and not (mark == ":" and clock is not None and clock.start() < at < clock.end()):
             return text[:at].strip(), [text[at + 1 :].strip()] if text[at + 1 :].strip() else []
-    if (parted := _by_blanks(text)) and _key(folded(parted[0][:LONGEST_LABEL]), "") is not None:
+    if (parted := _by_blanks(text)) and known.key(folded(parted[0][:LONGEST_LABEL])) is not None:
         return parted[0], [parted[1]]
     return text.strip(), []
 
@@ -176,15 +169,11 @@ def _by_blanks(text: str) -> tuple[str, str] | None:
     return label, text[end:]
 
 
-def _heading(words: str, label: str, values: Sequence[str]) -> str:
+def _heading(words: str, label: str, values: Sequence[str], known: Words) -> str:
     """Letter of an axis that is alone: beside the word for it, or as the whole of a heading; else nothing."""
     if not values:
         return label
-    return values[0] if len(values) == 1 and _ALONE.fullmatch(words) else ""
-
-
-def _axis_of(match: re.Match[str]) -> AxisName:
-    return _named(match[1] or match[2])
+    return values[0] if len(values) == 1 and known.is_axis(words) else ""
 
 
 def _named(letter: str) -> AxisName:
@@ -200,7 +189,9 @@ def _abreast(row: Row) -> list[AxisName]:
     return [_named(letter[1]) for letter in named]
 
 
-def _take(protocol: Protocol, axis: AxisName | None, words: str, label: str, values: Sequence[str]) -> bool:
+def _take(
+    protocol: Protocol, known: Words, axis: AxisName | None, words: str, label: str, values: Sequence[str]
+) -> bool:
     """Keep what a row says; False when it is not understood."""
     text = " ".join(values)
     if (parameter := _PARAMETER.search(label)) is not None:
@@ -217,7 +208,7 @@ def _take(protocol: Protocol, axis: AxisName | None, words: str, label: str, val
                 axis_values = protocol.axes.setdefault(owners[name.upper()], AxisProtocol())
                 axis_values.errors[name.upper()] = numbers_in(f"{value} {unit}")[0]
             return True
-    key = _key(words, folded(label[:LONGEST_LABEL].replace("(", " ")))
+    key = known.key(words, folded(label[:LONGEST_LABEL].replace("(", " ")))
     if key is None:
         return False
     if key == "time":
@@ -231,27 +222,6 @@ def _take(protocol: Protocol, axis: AxisName | None, words: str, label: str, val
         protocol.head.setdefault(key, _WORD_BEFORE_TIME.sub(" ", text[:200]) if key == "created" else text[:200])
         return True
     return _number(protocol, axis, key, text, words)
-
-
-def _key(words: str, everything: str) -> str | None:
-    """Meaning of a label: a known one, one that goes on, or by its words. everything: with the text in brackets."""
-    key = next((key for key, words_of in LABELS if words in words_of), None)
-    if key is None:
-        key = next(
-            (key for key, words_of in LABELS if any(words.startswith(f"{beginning} ") for beginning in words_of)), None
-        )
-    if key is None:
-        key = meaning(words)
-    if key in {"scatter", "scatter_before"}:
-        optimised = (
-            any(word in everything for word in OPTIMISED) or fits(everything, "=nach") or fits(everything, "after")
-        )
-        return (
-            "scatter_after"
-            if optimised and not any(fits(everything, beginning) for beginning in EARLIER)
-            else "scatter_before"
-        )
-    return key
 
 
 def _number(protocol: Protocol, axis: AxisName | None, key: str, text: str, words: str) -> bool:
@@ -321,7 +291,7 @@ def _vector(text: str) -> Point | None:
     return (numbers[0], numbers[1], numbers[2]) if len(numbers) == 3 else None
 
 
-def _columns(row: Row) -> tuple[AxisName, list[tuple[str, int]]] | None:
+def _columns(row: Row, known: Words) -> tuple[AxisName, list[tuple[str, int]]] | None:
     """The columns of the table behind a diagram, if this row is its head: (what, which of X Y Z)."""
     if len(row.cells) < 2:
         return None
@@ -331,16 +301,15 @@ def _columns(row: Row) -> tuple[AxisName, list[tuple[str, int]]] | None:
         words = folded(cell[:LONGEST_LABEL].replace("(", " ").replace(")", " "))
         if (match := _DEVIATION.search(words)) is not None:
             letters.add(match[2].upper())
-            after = any(word in words for word in OPTIMISED)
-            columns.append(("optimised" if after else "measured", "xyz".index(match[1])))
+            columns.append(("optimised" if known.is_optimised(words) else "measured", "xyz".index(match[1])))
         elif any(word in words for word in ("richtung", "direction", "smer")):
             columns.append(("approach", 0))
         else:
             columns.append(("angle" if not any(kind == "angle" for kind, _at in columns) else "other", 0))
-    if len(letters) != 1 or not any(kind == "angle" for kind, _at in columns):
-        return None
-    letter = letters.pop()
-    return ("A" if letter == "A" else "B" if letter == "B" else "C"), columns
+    deviations = [column for column in columns if column[0] in {"measured", "optimised"}]
+    if len(letters) != 1 or ("angle", 0) not in columns or len(set(deviations)) < len(deviations):
+        return None  # two columns for the same: which is which is not known
+    return _named(letters.pop()), columns
 
 
 def _deviation(protocol: Protocol, axis: AxisName, columns: Sequence[tuple[str, int]], row: Row) -> bool:

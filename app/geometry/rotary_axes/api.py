@@ -38,7 +38,7 @@ from app.web.api import (
     problems,
     sent_again,
 )
-from app.web.deps import SessionDep
+from app.web.deps import SessionDep, SettingsDep
 from app.web.etags import TAGGED, guarded, tagged
 from app.web.fields import Page, ReasonIn, Text200, page_of
 
@@ -53,7 +53,9 @@ HeadName = Annotated[str, StringConstraints(strip_whitespace=True, max_length=64
 
 
 @router.post("/kinematics/runs", status_code=201, responses=problems(404, 409) | sent_again(RunOut))
-def take_kinematics_run(session: SessionDep, caller: OperatorOrMachine, body: RunIn, response: Response) -> RunOut:
+def take_kinematics_run(
+    session: SessionDep, caller: OperatorOrMachine, body: RunIn, response: Response, settings: SettingsDep
+) -> RunOut:
     """Take a run of cycle 452: ball touches or centres (`axes`, `shift`), result parameters, or the control's protocol.
 
     A ball further off than maxDevCalBall makes a refused run: that is kept, and counts for nothing. A change larger than
@@ -62,7 +64,7 @@ def take_kinematics_run(session: SessionDep, caller: OperatorOrMachine, body: Ru
     """
     machine_for(session, caller, body.machine, "operator")
     session.commit()  # nothing is kept open while a protocol is read
-    protocol = protocol_apart(body.protocol)
+    protocol = protocol_apart(body.protocol, settings.rotary_words)
     with readings.pushing(session) as own:
         machine = machine_for(own, caller, body.machine, "operator")
         created = actions.take(own, machine, body, caller, protocol)

@@ -1,6 +1,7 @@
 """Runs that the control has reckoned itself: its result parameters and its protocol, read as far as they go."""
 
 from collections.abc import Mapping
+from pathlib import Path
 from typing import Any
 
 from app.core.decision.step import rounded
@@ -11,6 +12,7 @@ from app.errors import FieldError, Invalid
 from app.files.apart import apart
 from app.files.formats.delimited import Unusable
 from app.files.formats.rotary_protocol import AxisProtocol, Protocol, read_protocol
+from app.files.formats.rotary_words import known_words
 from app.geometry.rotary_axes import wording
 from app.geometry.rotary_axes.outcome import LETTERS, Evaluated, correction
 from app.language.i18n import _
@@ -152,12 +154,15 @@ def _moved(axis_protocol: AxisProtocol) -> tuple[float, float, float] | None:
 # --- the control's protocol
 
 
-def protocol_apart(text: str | None) -> Protocol | None:
-    """The control's protocol, read in a process of its own: no transaction should be open meanwhile. Raises `Invalid`."""
+def protocol_apart(text: str | None, words: Path | None = None) -> Protocol | None:
+    """The control's protocol, read in a process of its own: no transaction should be open meanwhile. Raises `Invalid`.
+
+    words: the plant's own file of words.
+    """
     if text is None:
         return None
     try:
-        return apart(read_protocol, text)
+        return apart(read_protocol, text, known_words(words))
     except Unusable as error:
         raise Invalid.at("protocol", str(error).removesuffix(".")) from None
 
@@ -171,7 +176,8 @@ def of_protocol(text: str, protocol: Protocol | None = None) -> Evaluated:
             _("this is no protocol of a run: {unread} of {rows} lines were not understood").format(
                 unread=len(protocol.unread), rows=protocol.rows
             ),
-            do=_("Send TCHPRAUTO.html as the control has written it, or the result parameters as `results`."),
+            do=_("Send TCHPRAUTO.html as the control has written it, or the result parameters as `results`.")
+            + wording.labels_to_add(protocol.unread),
         )
     evaluated = Evaluated("protocol", head=protocol.head)
     read = read_results("\n".join(protocol.parameters))
@@ -198,6 +204,7 @@ def of_protocol(text: str, protocol: Protocol | None = None) -> Evaluated:
         raise Invalid.at(
             "protocol",
             _("nothing of a rotary axis can be read in it: {notes}").format(notes=notes or _("it is empty")),
-            do=_("Send TCHPRAUTO.html as the control has written it, in German, English or Slovene."),
+            do=_("Send TCHPRAUTO.html as the control has written it, in German, English or Slovene.")
+            + wording.labels_to_add(protocol.unread),
         )
     return evaluated

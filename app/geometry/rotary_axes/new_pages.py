@@ -20,7 +20,7 @@ from app.geometry.rotary_axes.view import COMMON
 from app.language.i18n import _
 from app.loop.machines.queries import machine_named, machines
 from app.loop.readings import results_actions as readings
-from app.web.deps import SessionDep, texts
+from app.web.deps import SessionDep, get_settings, texts
 from app.web.forms import parsed
 from app.web.templates import page
 
@@ -86,7 +86,7 @@ def _send(request: Request, session: Session, caller: Caller, form: dict[str, st
         body = _given(form)
         machine_named(session, body.machine)
         session.commit()  # nothing is kept open while a protocol is read
-        protocol = protocol_apart(body.protocol)
+        protocol = protocol_apart(body.protocol, get_settings(request).rotary_words)
         machine = machine_named(session, body.machine)
         if form.get("do") == "look":
             limits = actions.limits_of(queries.plan(session, machine.id))

@@ -22,6 +22,8 @@ if TYPE_CHECKING:
     from app.geometry.rotary_axes.queries import RunRow
     from app.geometry.rotary_axes.tables import KinematicsRun
 
+MOST_LABELS = 5
+
 
 def angle(value: float | None, decimals: int = 4) -> str:
     r"""An angle in degrees with its sign.
@@ -160,6 +162,17 @@ def not_understood(line: Unread) -> str:
     if line.text == "<":
         return _("line {line}: the markup is broken and was skipped").format(line=line.line)
     return _("line {line} was not understood: “{text}”").format(line=line.line, text=line.text)
+
+
+def labels_to_add(unread: Sequence[Unread]) -> str:
+    """The labels that are not known and how to add them, behind other advice; nothing where there are none."""
+    labels = [f"“{label}”" for label in dict.fromkeys(line.label for line in unread) if label][:MOST_LABELS]
+    if not labels:
+        return ""
+    return " " + _(
+        "Labels in other words or another language, here {labels}, are added with a file that INBAND_ROTARY_WORDS names: "
+        "see Help, Rotary axes."
+    ).format(labels=", ".join(labels))
 
 
 def moved_otherwise(axis: str, moved: Sequence[float], correction_values: Sequence[float]) -> str:

@@ -9,7 +9,7 @@ from hypothesis import strategies as some
 
 from app.files.formats.markup import rows_of
 from app.files.formats.rotary_protocol import Protocol, numbers_in, read_protocol
-from app.files.formats.rotary_words import AXIS_KEYS, LABELS
+from app.files.formats.rotary_words import AXIS_KEYS, HEAD_KEYS, known_words
 
 FOLDER = Path(__file__).parent / "protocols"
 
@@ -95,10 +95,8 @@ def test_a_value_before_any_axis_belongs_to_none() -> None:
     assert [each.line for each in made.unread] == [1]
 
 
-def test_labels_name_one_thing_each() -> None:
-    everything = [label for _key, labels in LABELS for label in labels]
-    assert len(everything) == len(set(everything))
-    assert set(AXIS_KEYS) <= {"scatter_after", *(key for key, _labels in LABELS)}
+def test_every_value_has_words() -> None:
+    assert {*AXIS_KEYS, *HEAD_KEYS} - {"scatter_before", "scatter_after"} <= set(known_words().meanings)
 
 
 @pytest.mark.parametrize(

@@ -1,11 +1,14 @@
 """Runs in their four forms, limits of the control, and the door, on a running server."""
 
 from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
 from typing import Any
 
 import pytest
 
+from tests.databases import NewDatabase
 from tests.geometry.rotary_axes.bench import NAMES, RADIUS, RUNS, TRUE, axis, enter, plan, protocol, take, touched
+from tests.in_process import in_process
 from tests.servers import Server
 from tests.shop import Person, Shop
 
@@ -131,6 +134,28 @@ class TestForms:
         assert axis["correction"] is None
         number = take(shop, protocol="<h2>Axis C</h2><p>EX0C: 0.004</p>")["run"]
         assert shop.call("GET", f"{RUNS}/{number}")["axes"][0]["correction"] == [0.004, 0.0, 0.0]
+
+    def test_words_of_the_plant(self, new_database: NewDatabase, tmp_path: Path) -> None:
+        protocol = "<h2>Asse C</h2><p>Gioco medio: 0,002</p>"
+        (tmp_path / "words.toml").write_text('[axis]\nlabels = ["asse"]\n[backlash]\nlabels = ["Gioco medio"]')
+        with in_process(new_database(), rotary_words=tmp_path / "words.toml") as server:
+            shop = Shop(server)
+            (axis,) = take(shop, protocol=protocol)["axes"]
+            assert axis["backlash"]["value"] == 0.002
+            engineer = Person(server, "engineer")
+            fields = {"machine": shop.machine, "as": "protocol", "protocol": protocol}
+            assert "Everything was understood" in engineer.send("/kinematics/new", 200, **fields, do="look")
+
+    def test_a_label_that_is_not_known_is_named_with_what_adds_it(self, shop: Shop) -> None:
+        protocol = "<h2>Asse C</h2><p>Gioco medio: 0,002</p>"
+        advice = take(shop, 422, protocol=protocol)["what_to_do"]
+        assert "here “Asse C”, “Gioco medio”, are added with a file that INBAND_ROTARY_WORDS names" in advice
+        engineer = Person(shop.server, "engineer")
+        fields = {"machine": shop.machine, "as": "protocol"}
+        assert "INBAND_ROTARY_WORDS" in engineer.send("/kinematics/new", 422, **fields, protocol=protocol)
+        seen = engineer.send("/kinematics/new", 200, **fields, protocol="C axis\nBacklash: 0.1\nGioco: 1")
+        assert "/help/how-to/rotary-axes#add-words-of-a-protocol" in seen
+        assert "INBAND_ROTARY_WORDS" in engineer.open("/help/how-to/rotary-axes")
 
     def test_the_clock_of_the_control(self, shop: Shop) -> None:
         run = take(shop, protocol=protocol("de"), timezone="Europe/Ljubljana")
