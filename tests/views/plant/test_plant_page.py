@@ -10,7 +10,7 @@ from sqlalchemy import event, text
 
 from app.core.state import CharacteristicState
 from app.views.characteristic import state_queries as queries
-from tests.pages.looks import live
+from tests.pages.looks import boxes, live, resize
 from tests.servers import RunServer, Server
 from tests.shop import PARAMETERS, Person, Shop
 from tests.waits import until
@@ -172,6 +172,22 @@ class TestLive:
             page.wait_for_timeout(20)
         held[0].continue_()
         expect(line(page, shop)).to_contain_text("Oversize")
+
+    @pytest.mark.parametrize("size", ["desk", "phone"])
+    def test_a_row_keeps_its_height_when_corrections_and_alarms_come(
+        self, shop: Shop, viewer: Person, page: Page, size: str
+    ) -> None:
+        shop.read(0.2)
+        viewer.sign_in(page)
+        resize(page, size)
+        page.goto(f"/plant/{shop.machine}")
+        live(page)
+        row = f"#c-{shop.characteristic}"
+        before = boxes(page, row)[0]["height"]
+        for deviation, shown in ((6.1, "pending"), (-6.3, "and 1 more"), (12.0, "1 alarm")):
+            shop.read(deviation)
+            expect(line(page, shop)).to_contain_text(shown)
+            assert boxes(page, row)[0]["height"] == before, shown
 
     def test_a_new_characteristic_appears(self, shop: Shop, viewer: Person, page: Page) -> None:
         viewer.sign_in(page)
