@@ -1,7 +1,10 @@
 """Set-up in a real browser: the zone diagram draws while one types, by mouse-free hands."""
 
+import io
+
 import pytest
 from playwright.sync_api import Page, expect
+from pypdf import PdfReader
 
 from tests.shop import Person, Shop, unique
 
@@ -177,3 +180,15 @@ def test_an_address_has_no_field_that_was_left_empty(signed_in: Page) -> None:
     page.press("[name=actor]", "Enter")
     page.wait_for_url("**/setup/audit?*")
     assert page.url.partition("?")[2] == "actor=engineer"
+
+
+@pytest.mark.parametrize("across", [False, True], ids=["upright", "across"])
+def test_on_paper_no_heading_is_left_at_the_foot_of_a_sheet(signed_in: Page, shop: Shop, across: bool) -> None:
+    page = signed_in
+    for address in ("/setup/characteristics/new", f"/setup/characteristics/{shop.characteristic}"):
+        page.goto(address)
+        headings = {text.strip() for text in page.locator("h1, h2, h3, legend").all_text_contents()}
+        assert "What happens where" in headings
+        for sheet in PdfReader(io.BytesIO(page.pdf(format="A4", landscape=across))).pages:
+            lines = [line.strip() for line in sheet.extract_text().splitlines() if line.strip()]
+            assert not lines or lines[-1] not in headings, (address, lines[-2:])
