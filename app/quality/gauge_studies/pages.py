@@ -215,6 +215,7 @@ def _form(
             (row.characteristic.key, f"{row.characteristic.key} – {row.characteristic.name}, {row.machine.name}")
             for row in usable
         ],
+        machine_of={row.characteristic.key: row.machine.key for row in usable},
         heading=form_reader.heading,
         wording=wording,
     )

@@ -255,6 +255,18 @@ class TestInTheBrowser:
         page.wait_for_url("**/setup/characteristics/**done=**")
         assert shop.call("GET", f"/characteristics/{shop.characteristic}")["parameters"]["zero_range"] == 0.0018
 
+    def test_machine_and_characteristic_never_contradict_each_other(
+        self, page: Page, shop: Shop, operator: Person
+    ) -> None:
+        other = Shop(shop.server)
+        operator.sign_in(page)
+        page.goto(f"/gauges/new?kind=type_one&machine={other.machine}")
+        machine, characteristic = page.locator("[name=machine]"), page.locator("[name=characteristic]")
+        characteristic.select_option(shop.characteristic)
+        expect(machine).to_have_value(shop.machine)
+        machine.select_option(other.machine)
+        expect(characteristic).to_have_value("")
+
     @pytest.mark.long
     def test_a_block_from_a_spreadsheet_is_pasted_into_the_first_cell(
         self, page: Page, shop: Shop, engineer: Person, complaints: list[str]
