@@ -30,6 +30,13 @@ def found_word(found: str) -> str:
     }.get(found, found)
 
 
+def cut_without() -> str:
+    """The sentence below a table that names corrections a part was cut without."""
+    return _(
+        "Cut without correction: numbers of the corrections that were issued before the part was cut, but took effect only after it."
+    )
+
+
 def part_name(part: str | None, to: str | None = None) -> str:
     """A part by its name, or a row of several."""
     return _("no name") if part is None else part if to is None else _("{first} to {last}").format(first=part, last=to)

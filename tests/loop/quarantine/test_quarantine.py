@@ -110,6 +110,8 @@ def test_offset_and_a_correction_that_came_too_late_are_said_of_each_part(shop: 
     (alarm,) = shop.alarms()
     third, fourth = affected(shop, alarm["id"])["stretches"][0]["parts"]
     assert (third["offset"], third["cut_without"]) == (0.0, [number])
+    page = Person(shop.server, "viewer").open(f"/alarms/{alarm['id']}/affected")
+    assert "Cut without correction: numbers of the corrections that were issued before the part was cut" in page
     assert (fourth["offset"], fourth["cut_without"][:1]) == (-0.006, [third_correction(shop, 3)])
 
 
@@ -232,6 +234,7 @@ def test_pages_lead_from_the_alarm_to_each_part(shop: Shop, server: Server) -> N
     shown = operator.open(f"/alarms/{alarm}/affected")
     assert "SN-0006" in shown
     assert "SN-0004" in shown
+    assert f'href="/alarms/{alarm}/affected"' not in shown, "a page does not lead to itself"
     wrong = operator.send(f"/alarms/{alarm}/affected", 422, guard="x", reason="Edge broken")
     assert "SN-0006" in wrong
     made = operator.post(f"/alarms/{alarm}/affected", guard="0,5", reason="Edge broken").headers["location"]

@@ -61,5 +61,7 @@ def test_its_page_says_what_it_rests_on(ran: Shop, server: Server) -> None:
     viewer = Person(server, "viewer")
     page = viewer.open(f"/ledger?machine={ran.machine}")
     assert "Corrections saved" in page
-    assert "INBAND_PART_COST" in page
+    assert "ask an administrator to set the cost of a part" in page
+    assert "INBAND_" not in page
+    assert "INBAND_PART_COST" in Person(server, "admin").open(f"/ledger?machine={ran.machine}")
     assert "Nothing to reckon" in viewer.open(f"/ledger?machine={ran.machine}&from=2020-01-01&to=2020-02-01")

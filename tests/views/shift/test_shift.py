@@ -85,8 +85,18 @@ def test_of_all_machines_it_is_the_sum_and_a_shift_without_anything_is_empty(ran
 def test_its_page_leads_from_shift_to_shift(ran: Shop, server: Server) -> None:
     viewer = Person(server, "viewer")
     page = viewer.open(f"/shift?machine={ran.machine}&at=2026-03-05T07:00Z")
-    for words in ("Out of tolerance", "3 min", "10 min", "Shift before", "Next shift", "INBAND_SHIFTS", "by itself"):
+    for words in (
+        "Out of tolerance",
+        "3 min",
+        "10 min",
+        "Shift before",
+        "Next shift",
+        "an administrator can set your plant",
+        "by itself",
+    ):
         assert words in page
+    assert "INBAND_" not in page
+    assert "INBAND_SHIFTS" in Person(server, "admin").open("/shift")
     assert "Next shift" not in viewer.open("/shift")
     assert "Nothing was measured" in viewer.open("/shift?at=1971-01-01")
     assert "at:" in viewer.open("/shift?at=yesterday", 422)
