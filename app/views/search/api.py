@@ -41,7 +41,7 @@ def search(
         ),
     ],
 ) -> SearchOut:
-    """Machines, characteristics, tools, alarms, parts and pages by their names, notes and help by their words, people (admin).
+    """Machines, characteristics, tools, alarms, parts and pages by their names, notes and help by their words, people (engineer: what they did; admin).
 
     Every word has to occur; blanks, hyphens, dots and Ø do not count, so that *bore 30* finds *Bore Ø30 H7* and *lathe1* finds
     *lathe-1*. Parts are found by their whole name, or by its first or last three letters or more among the newest half a million

@@ -3,6 +3,7 @@
 from collections.abc import Iterator, Sequence
 from functools import cache
 from typing import Literal, NamedTuple
+from urllib.parse import urlencode
 
 from sqlalchemy import ColumnElement, Select, func, literal_column, or_, select
 from sqlalchemy.orm import Session
@@ -59,7 +60,7 @@ def hits(session: Session, term: str, caller: Caller) -> list[Hit]:
         *_characteristics(session, words),
         *_tools(session, words),
         *_alarms(session, term, words),
-        *(_people(session, words) if caller.may("admin") else ()),
+        *(_people(session, words, caller) if caller.may("engineer") else ()),
         *_parts(session, term),
         *_notes(session, term),
         *_pages(words, caller),
@@ -157,11 +158,16 @@ def _number(term: str, *signs: str, most: int) -> int | None:
     return int(rest) if rest.isascii() and rest.isdecimal() and len(rest) < 20 and int(rest) <= most else None
 
 
-def _people(session: Session, words: Sequence[str]) -> Iterator[Hit]:
+def _people(session: Session, words: Sequence[str], caller: Caller) -> Iterator[Hit]:
+    """An administrator is led to the person; an engineer, who may read the record of changes, to what that person did."""
     named, ranked = matching(words, Person.name)  # type: ignore[arg-type]
     query = select(Person.id, Person.name, ranked).where(named).order_by(ranked, Person.name).limit(MOST_OF_A_KIND)
     for number, name, how_well in session.execute(query):
-        yield Hit("person", name, name, f"/setup/people#person-{number}", how_well)
+        if caller.may("admin"):
+            yield Hit("person", name, name, f"/setup/people#person-{number}", how_well)
+        else:
+            title = _("{name}: record of changes").format(name=name)
+            yield Hit("person", name, title, f"/setup/audit?{urlencode({'actor': name})}", how_well)
 
 
 def _parts(session: Session, term: str) -> Iterator[Hit]:

@@ -89,6 +89,10 @@ def test_rights(searched: Shop, server: Server) -> None:
     person = Person(server, "viewer")
     assert found(searched, person.name.upper())[0] == ("person", person.name)
     assert ("person", person.name) not in found(searched, person.name, person.browser)
+    engineer = Person(server, "engineer")
+    assert ("person", person.name) in found(searched, person.name, engineer.browser)
+    assert f"/setup/audit?actor={person.name}" in engineer.open(f"/search?q={person.name}")
+    assert person.name in engineer.open(f"/setup/audit?actor={person.name}")
     assert searched.machine_client.get("/api/v1/search?q=a").status_code == 403
     assert searched.admin.get("/api/v1/search").status_code == 422
     assert searched.admin.get("/api/v1/search?q=a%00").status_code == 422
