@@ -42,7 +42,7 @@ PARTS = {  # only ever fetched into a page
     "/todo/not-reached",
     "/wall/now",
     "/setup/fit",
-    "/setup/natural",
+    "/setup/named",
     "/station/{machine}/events",
     "/station/{machine}/pictures/{picture}",
     "/characteristics/{characteristic}/readings/{sequence}/panel",

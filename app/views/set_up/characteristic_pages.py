@@ -10,7 +10,7 @@ from sqlalchemy.orm import Session
 from starlette.responses import RedirectResponse
 
 from app.access.deps import Caller, Engineer, Viewer, require
-from app.core.fits import fit_of
+from app.core.fits import fit_of, in_name
 from app.core.natural_limit import looks_natural
 from app.core.parameters import AVERAGE_LOCATIONS, BY_NAME, Mode, Parameters
 from app.core.plausibility import suggested_jump
@@ -318,13 +318,19 @@ def _characteristic(
 def fit(size: Annotated[str, Query(max_length=40)]) -> dict[str, str]:
     """Nominal and deviations of a size with a tolerance class (`40 h6`), as they are typed; empty for any other text."""
     found = fit_of(size)
-    return {} if found is None else {name: f"{value:.10g}" for name, value in found._asdict().items()}
+    return {} if found is None else _as_typed(found._asdict())
 
 
-@router.get("/setup/natural", response_model=None, dependencies=[require("viewer")])
-def natural(name: Annotated[str, Query(max_length=200)]) -> dict[str, str]:
-    """The limits that follow from a name: 0 is the natural one of roundness, run-out, straightness; empty for any other name."""
-    return {"natural_limit": "lower", "nominal": "0", "lower_deviation": "0"} if looks_natural(name) else {}
+def _as_typed(lengths: Mapping[str, float]) -> dict[str, str]:
+    return {name: f"{value:.10g}" for name, value in lengths.items()}
+
+
+@router.get("/setup/named", response_model=None, dependencies=[require("viewer")])
+def named(name: Annotated[str, Query(max_length=200)]) -> dict[str, str]:
+    """Proposal of the sizes that follow from a name: 0 as the natural limit of roundness, run-out, straightness; else its size."""
+    if looks_natural(name):
+        return {"natural_limit": "lower", "nominal": "0", "lower_deviation": "0"}
+    return _as_typed(in_name(name))
 
 
 def _suggested_jump(session: Session, current: queries.CurrentCharacteristic) -> float | None:

@@ -16,14 +16,14 @@ export async function ofClass(form, size) {
   return form.elements.nominal.value === size ? numbers : null;
 }
 
-/** 0 and the natural limit for a name such as Run-out. null: something is typed, chosen or corrected by a tool already. */
+/** The size in a name such as Bore 30 H7; 0 and the natural limit for Run-out. null: something is typed, chosen or, at 0, corrected by a tool. */
 export async function ofName(form, name) {
   const fields = form.elements;
-  const isUntouched = () => !fields.nominal.value && !fields.lower_deviation.value && !fields.natural_limit.value
-    && !fields.target.value && !typed(fields.tool_memory.value) && fields.name.value === name;
+  const isUntouched = () => ["nominal", "upper_deviation", "lower_deviation", "natural_limit", "target", "tolerance_width"]
+    .every((each) => !fields[each].value) && fields.name.value === name;
   if (!name || !isUntouched()) return null;
-  const values = await asked("/setup/natural", { name: name.slice(0, 200) });
-  return isUntouched() ? values : null;
+  const values = await asked("/setup/named", { name: name.slice(0, 200) });
+  return isUntouched() && !(values.natural_limit && typed(fields.tool_memory.value)) ? values : null;
 }
 
 /** Limits of a new characteristic, mm, as `app/core/suggested.py` has them; the signal path may ask for more. */

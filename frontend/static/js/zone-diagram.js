@@ -3,7 +3,8 @@
 // The server has drawn it; bands are equally tall, so what follows the typing is words alone. With every key it
 //   – writes deviation and size at each limit, target and width (L75), and the µm beside each length ([data-um]);
 //   – writes a tolerance class typed with the nominal size, 40 h6, as nominal and deviations once the field is left;
-//   – fills in 0 and the natural limit for a name such as Run-out, where nothing is typed yet and no tool is corrected;
+//   – proposes the size in a name such as Bore 30 H7, and 0 as the natural limit of Run-out, where nothing is typed yet
+//     ([data-proposed] says so until one of them is typed over);
 //   – shows what an empty limit of a new characteristic takes (form[data-suggests]);
 //   – marks a limit that breaks R33 < R34 ≤ R35/2 ≤ R37 ≤ R36, and says why at the field, in the server's own sentences.
 // The server checks the same again when the form is sent; without this script nothing is lost but the immediacy.
@@ -20,12 +21,18 @@ customElements.define("zone-diagram", class extends HTMLElement {
     this.sentences = JSON.parse(this.dataset.sentences);
     this.one_sided = JSON.parse(this.dataset.oneSided); // from a natural limit R35 counts whole
     this.typing = (event) => {
+      if (this.proposed && event.target.name in this.proposed) this.propose(null);
       this.forget(event.target);
       this.draw();
     };
     this.form.addEventListener("input", this.typing);
     this.leaving = async ({ target: { name, value } }) => {
-      if (name === "name") this.fill(await ofName(this.form, value));
+      if (name === "name") {
+        this.withdraw();
+        const values = await ofName(this.form, value);
+        this.propose(values && Object.keys(values).length ? values : null);
+        this.fill(values);
+      }
       if (name !== "nominal") return;
       const numbers = await ofClass(this.form, value);
       if (numbers) this.unknown = "nominal" in numbers ? null : value; // refused in words when the form is sent
@@ -33,6 +40,19 @@ customElements.define("zone-diagram", class extends HTMLElement {
     };
     this.form.addEventListener("change", this.leaving);
     this.draw();
+  }
+
+  /** Values that nobody has typed, with the words that say so; null: there are none any more. */
+  propose(values) {
+    this.proposed = values;
+    const words = this.form.querySelector("[data-proposed]");
+    if (words) words.hidden = !values;
+  }
+
+  /** Of another name something else is proposed: what was proposed, and not typed over, goes. */
+  withdraw() {
+    if (this.proposed) this.fill(Object.fromEntries(Object.keys(this.proposed).map((name) => [name, ""])));
+    this.propose(null);
   }
 
   fill(values) {

@@ -182,6 +182,30 @@ def test_an_address_has_no_field_that_was_left_empty(signed_in: Page) -> None:
     assert page.url.partition("?")[2] == "actor=engineer"
 
 
+def test_a_name_with_a_size_proposes_it_and_says_so_until_a_person_types(signed_in: Page) -> None:
+    page = signed_in
+    sizes = ("nominal", "upper_deviation", "lower_deviation")
+
+    def name_is(name: str, *values: str) -> None:
+        page.fill("[name=name]", name)
+        page.locator("[name=name]").blur()
+        for field, value in zip(sizes, values, strict=True):
+            expect(page.locator(f"[name={field}]")).to_have_value(value)
+
+    page.goto("/setup/characteristics/new")
+    proposed = page.locator("[data-proposed]")
+    expect(proposed).to_be_hidden()
+    name_is("Bore 30 H7", "30", "0.021", "0")
+    expect(proposed).to_be_visible()
+    name_is("Bore Ø32", "32", "", "")
+    name_is("Bore 2", "", "", "")
+    expect(proposed).to_be_hidden()
+    name_is("Bore 30 H7", "30", "0.021", "0")
+    page.fill("[name=upper_deviation]", "0.03")
+    expect(proposed).to_be_hidden()
+    name_is("Bore 40 H7", "30", "0.03", "0")
+
+
 @pytest.mark.parametrize("across", [False, True], ids=["upright", "across"])
 def test_on_paper_no_heading_is_left_at_the_foot_of_a_sheet(signed_in: Page, shop: Shop, across: bool) -> None:
     page = signed_in
