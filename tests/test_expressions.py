@@ -102,7 +102,9 @@ def expressions() -> dict[str, Expression]:
                     func=ast.Attribute(value=ast.Name(id="re"), attr=way), args=[ast.Constant(value=text), *_]
                 ):
                     flags = [ast.unparse(each.value) for each in call.keywords if each.arg == "flags"] or [
-                        ast.unparse(each) for each in call.args[1:] if ast.unparse(each).startswith("re.")
+                        ast.unparse(each)
+                        for each in call.args[1:]
+                        if re.fullmatch(r"re\.[A-Z]+( \| re\.[A-Z]+)*", ast.unparse(each))
                     ]
                     pattern = re.compile(text, eval(flags[0]) if flags else 0)  # noqa: S307 - of our own source
                     ways = {WAYS.get(way, way)} if way != "compile" else ANY

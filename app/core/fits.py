@@ -131,7 +131,7 @@ def fit_of(text: str) -> Fit | None:
 
 
 _IN_NAME = re.compile(r"(?<![\w.,/-])[ØøΦφ⌀]?\s?[0-9.,]{1,20}\s?(?:[A-Z]{1,2}|[a-z]{1,2})[1-9][0-9]?(?![\w.,/])")
-_DIAMETER = re.compile(r"[ØøΦφ⌀]\s?([0-9]{1,4}(?:[.,][0-9]{1,6})?)(?![\w.,]*\d)")
+_DIAMETER = re.compile(r"[ØøΦφ⌀]\s?([0-9]{1,4}(?:[.,][0-9]{1,6})?)(?![\w.,]{0,20}\d)")
 
 
 def in_name(name: str) -> dict[str, float]:

@@ -1,8 +1,7 @@
 // <plotly-chart src="URL of figure JSON" on="reading:shaft-d40 alarm" label="what it shows, in words"></plotly-chart>
 // A chart. Its size comes from CSS (class "zones" is the tall one).
 //
-//   src    answers {"data": […], "layout": {…}}; asked with ?theme=light|dark&width=pixels, and again when the theme
-//          or the width changes
+//   src    answers {"data": […], "layout": {…}}; asked with ?theme=light|dark&width=pixels, again when one of them changes
 //   on     live events (see live.js) after which it is fetched again, at most once a second; what part is shown is kept
 //   label  for those who cannot see it; what the chart shows must also stand in a list on the page
 //   name   of the part that is shown, in the address (chart-view.js); "zoom" if left out

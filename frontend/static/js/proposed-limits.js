@@ -17,13 +17,41 @@ export async function ofClass(form, size) {
 }
 
 /** The size in a name such as Bore 30 H7; 0 and the natural limit for Run-out. null: something is typed, chosen or, at 0, corrected by a tool. */
-export async function ofName(form, name) {
+async function ofName(form, name) {
   const fields = form.elements;
   const isUntouched = () => ["nominal", "upper_deviation", "lower_deviation", "natural_limit", "target", "tolerance_width"]
     .every((each) => !fields[each].value) && fields.name.value === name;
   if (!name || !isUntouched()) return null;
   const values = await asked("/setup/named", { name: name.slice(0, 200) });
   return isUntouched() && !(values.natural_limit && typed(fields.tool_memory.value)) ? values : null;
+}
+
+/** What the name proposes, until one of the values is typed over; fill(values): writes them. [data-proposed] says so meanwhile. */
+export class NameProposal {
+  constructor(form, fill) {
+    this.form = form;
+    this.fill = fill;
+  }
+
+  /** Of another name something else is proposed: what was proposed before, and not typed over, goes. */
+  async of(name) {
+    if (this.values) this.fill(Object.fromEntries(Object.keys(this.values).map((each) => [each, ""])));
+    this.show(null);
+    const values = await ofName(this.form, name);
+    if (!values || !Object.keys(values).length) return;
+    this.show(values);
+    this.fill(values);
+  }
+
+  typedOver(name) {
+    if (this.values && name in this.values) this.show(null);
+  }
+
+  show(values) {
+    this.values = values;
+    const words = this.form.querySelector("[data-proposed]");
+    if (words) words.hidden = !values;
+  }
 }
 
 /** Limits of a new characteristic, mm, as `app/core/suggested.py` has them; the signal path may ask for more. */

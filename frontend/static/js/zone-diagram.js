@@ -3,13 +3,12 @@
 // The server has drawn it; bands are equally tall, so what follows the typing is words alone. With every key it
 //   – writes deviation and size at each limit, target and width (L75), and the µm beside each length ([data-um]);
 //   – writes a tolerance class typed with the nominal size, 40 h6, as nominal and deviations once the field is left;
-//   – proposes the size in a name such as Bore 30 H7, and 0 as the natural limit of Run-out, where nothing is typed yet
-//     ([data-proposed] says so until one of them is typed over);
+//   – proposes the size in a name such as Bore 30 H7, and 0 as the natural limit of Run-out, where nothing is typed yet;
 //   – shows what an empty limit of a new characteristic takes (form[data-suggests]);
 //   – marks a limit that breaks R33 < R34 ≤ R35/2 ≤ R37 ≤ R36, and says why at the field, in the server's own sentences.
 // The server checks the same again when the form is sent; without this script nothing is lost but the immediacy.
 
-import { naturalSide, ofClass, ofName, ofTolerance } from "./proposed-limits.js";
+import { NameProposal, naturalSide, ofClass, ofTolerance } from "./proposed-limits.js";
 import { deviation, millimetres, MINUS, nanometres, plain, size, typed, usable } from "./sizes.js";
 
 const NAMES = ["nominal", "upper_deviation", "lower_deviation", "target", "tolerance_width",
@@ -20,19 +19,15 @@ customElements.define("zone-diagram", class extends HTMLElement {
     this.form = this.closest("form");
     this.sentences = JSON.parse(this.dataset.sentences);
     this.one_sided = JSON.parse(this.dataset.oneSided); // from a natural limit R35 counts whole
+    const proposal = new NameProposal(this.form, (values) => this.fill(values));
     this.typing = (event) => {
-      if (this.proposed && event.target.name in this.proposed) this.propose(null);
+      proposal.typedOver(event.target.name);
       this.forget(event.target);
       this.draw();
     };
     this.form.addEventListener("input", this.typing);
     this.leaving = async ({ target: { name, value } }) => {
-      if (name === "name") {
-        this.withdraw();
-        const values = await ofName(this.form, value);
-        this.propose(values && Object.keys(values).length ? values : null);
-        this.fill(values);
-      }
+      if (name === "name") await proposal.of(value);
       if (name !== "nominal") return;
       const numbers = await ofClass(this.form, value);
       if (numbers) this.unknown = "nominal" in numbers ? null : value; // refused in words when the form is sent
@@ -40,19 +35,6 @@ customElements.define("zone-diagram", class extends HTMLElement {
     };
     this.form.addEventListener("change", this.leaving);
     this.draw();
-  }
-
-  /** Values that nobody has typed, with the words that say so; null: there are none any more. */
-  propose(values) {
-    this.proposed = values;
-    const words = this.form.querySelector("[data-proposed]");
-    if (words) words.hidden = !values;
-  }
-
-  /** Of another name something else is proposed: what was proposed, and not typed over, goes. */
-  withdraw() {
-    if (this.proposed) this.fill(Object.fromEntries(Object.keys(this.proposed).map((name) => [name, ""])));
-    this.propose(null);
   }
 
   fill(values) {
