@@ -20,6 +20,8 @@ from app.views.wall.pages import MOST, WITHIN, Rate
 from tests.servers import Server
 from tests.shop import Person, Shop, unique
 
+pytestmark = pytest.mark.own_server  # what can be read from afar of all machines of other files fits on no screen
+
 SHARES = 6
 FOR_EVERYBODY = re.compile(
     r"/wall|/sign-in|/invitation/.*|/station|/health/.*|/metrics|/api/v1/openapi\.json|/api/docs|/static/.*|/favicon\.ico"
