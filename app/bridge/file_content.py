@@ -33,7 +33,7 @@ from app.bridge.file_rows import (
     reasons,
     unit_in_doubt,
     units_of,
-    untimes_wording,
+    unnamed_times,
 )
 from app.bridge.file_settings import Settings
 from app.bridge.links import Received
@@ -210,7 +210,7 @@ class _Reader:
         columns = dict(self.settings.columns) or {name: name for name in FIELDS}
         table = list(rows)
         if "measured_at" not in self.settings.columns:
-            unnamed = untimes_wording(columns, table, self.settings.times)
+            unnamed = unnamed_times(columns, table, self.settings.times)
             columns |= unnamed.column
             table += unnamed.said
         column = columns.get("measured_at", "")

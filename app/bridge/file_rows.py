@@ -118,9 +118,7 @@ class UnnamedTimes(NamedTuple):
     said: list[tuple[int, Found]]
 
 
-def untimes_wording(
-    columns: Mapping[str, str], table: Sequence[tuple[int, Found]], pattern: str | None
-) -> UnnamedTimes:
+def unnamed_times(columns: Mapping[str, str], table: Sequence[tuple[int, Found]], pattern: str | None) -> UnnamedTimes:
     """The only column that holds times, where none is configured: none is there under its name, or that one holds days alone.
 
     A fault where several may be it; a remark on numbers that may be times.

@@ -6,7 +6,7 @@ all digits before it are the number, so ``R240=0`` is R240, which the cycles do 
 the same as the R numbers. As on the control the last assignment counts; a program ends with M17, M02, M30 or RET.
 
 R numbers have no unit: the cycle takes them in the one that is in effect when it is called. Under G70 or G700 they become mm
-here; where the unit changes between an assignment and the call, it is not certain, and the lengths are dropped and named.
+here; where the unit changes between an assignment and the call, the unit cannot be determined, and the lengths are dropped and named.
 """
 
 import re

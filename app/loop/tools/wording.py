@@ -207,8 +207,8 @@ def still_active(alarm: int) -> str:
 def offset_differs(alarm: int, expected: float, reported: float, fallen: list[int]) -> str:
     """Said to the machine that reported another offset than expected."""
     sentence = _(
-        "The machine holds {reported}, expected was {expected}. Nothing is corrected through this tool until it is "
-        "answered at alarm {alarm} which of them is true."
+        "The machine holds {reported}, expected was {expected}. Nothing is corrected through this tool until alarm "
+        "{alarm} is answered with the one that is true."
     ).format(reported=mm(reported), expected=mm(expected), alarm=alarm)
     return " ".join(filter(None, (sentence, edit_note(fallen))))
 
