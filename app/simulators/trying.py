@@ -73,6 +73,11 @@ def characteristics(machine: plant.Machine) -> list[dict[str, Any]]:
     ]
 
 
+def simulation(machine: plant.Machine) -> Machine:
+    """The lathe as it cuts. Whatever its keys are, everybody sees the same: a correction of each tool within eight parts, then a chip."""
+    return Machine(machine, seed=1, drawn_as=_LATHE.key)
+
+
 class OneLine(Line):
     """The lathe without an operator."""
 
@@ -131,7 +136,7 @@ def _run(url: str, host: str, secret: str, machine: str, ending: threading.Event
             spec = lathe(machine.removeprefix("simulated-"))
             run = datetime.now(UTC).strftime("%y%m%d%H%M%S")
             rng = Random(machine)  # noqa: S311 - a simulated machine, not cryptography
-            line = OneLine(Machine(spec, seed=1), gateway, gateway, run, rng, ending)
+            line = OneLine(simulation(spec), gateway, gateway, run, rng, ending)
             if line.has_history():
                 line.settle()
             line.live(Pace(SPEED, datetime.now(UTC), line.machine.at))

@@ -90,7 +90,8 @@ class Probe:
 class Machine:
     """A machine tool that cuts parts one after the other and measures them a little later."""
 
-    def __init__(self, spec: plant.Machine, seed: int, *, incidents: bool = True) -> None:
+    def __init__(self, spec: plant.Machine, seed: int, *, incidents: bool = True, drawn_as: str | None = None) -> None:
+        """Random numbers are those of the seed and of the machine's key, or of the key `drawn_as`."""
         self.spec = spec
         self.at = 0.0
         self.serial = 0
@@ -100,7 +101,7 @@ class Machine:
         self.pipeline: deque[Part] = deque()
         self._incidents = incidents
         self._cutting, self._probing, self._fate = (
-            Random(f"{seed}:{spec.key}:{what}") for what in ("cutting", "probing", "fate")
+            Random(f"{seed}:{drawn_as or spec.key}:{what}") for what in ("cutting", "probing", "fate")
         )
         self._next_break = SHIFT * self._fate.uniform(0.4, 1.0)
         self.breaks = 0

@@ -53,8 +53,7 @@ def renamed(spec: plant.Machine) -> plant.Machine:
 def begun(server: Server, spec: plant.Machine) -> Iterator[Line]:
     """The machine under other names: what happens to it by chance is what happens to ``spec``."""
     (line,) = lines(server.url, server.key("admin"), 1, threading.Event(), [renamed(spec)])
-    other, line.machine = line.machine, Machine(spec, 1)
-    line.machine.spec = other.spec
+    line.machine = Machine(line.machine.spec, 1, drawn_as=spec.key)
     yield line
     line.close()
 
