@@ -31,17 +31,18 @@ _WORDS: Final[dict[str, str]] = {
     word: unit
     for unit, words in {
         "mm": "mm millimeter millimeters millimetern millimetre millimetres millimetri milimetar milimetara milimetri milimetrih "
-        "milímetro milímetros milimetro milimetros milimetry milimetrů milimetrów milimetre millimètre millimètres "
+        "milímetro milímetros milimetro milimetros milimetry milimetrů milimetrów milimetrach milimetrech milimetre milliméter "
+        "milliméterben millimètre millimètres "
         "мм миллиметр миллиметры миллиметрах милиметар 毫米 ミリ",
         "um": "µm um mikrometer mikrometern micrometer micrometers micrometre micrometres micron microns mikron mikrona mikroni mikronen "
-        "mikronima mikronih mikrony mikronů mikronów mikrón mícron mícrons micrones micra micras mikra mikrometar mikrometara mikrometri "
-        "mikrometrov mikrometrih mikrometrů mikrometrów mikrometre micromètre micromètres micrometro micrometri micrómetro micrómetros "
+        "mikronima mikronih mikrony mikronů mikronów mikronach mikronech mikronban mikrón mícron mícrons micrones micra micras mikra mikrometar mikrometara mikrometri "
+        "mikrometrov mikrometrih mikrometrů mikrometrów mikrometr mikrometrach mikrometrech mikrométer mikrométerben mikrometre micromètre micromètres micrometro micrometri micrómetro micrómetros "
         "mkm мкм микрон микроны микронах микрона микронима микрометр микрометры микрометрах 微米 ミクロン マイクロメートル",
         "nm": "nm nanometer nanometre",
         "cm": "cm centimeter centimetre zentimeter см",
         "m": "m meter metre м",
         "inch": "in in. ins inch inches zoll inč inča inči inčima pouce pouces pollice pollici pulgada pulgadas pulg polegada polegadas "
-        "tomme tommer tuuma tuumaa tuumat hüvelyk palce palců cale inç дюйм дюйма дюймы дюймов дюймах инч инча инчи инчима 英寸 インチ "
+        "tomme tommer tuuma tuumaa tuumat tuumina hüvelyk hüvelykben palce palců palcích cale calach inç дюйм дюйма дюймы дюймов дюймах инч инча инчи инчима 英寸 インチ "
         "\" '' ″ ”",
         "mil": "mil mils thou thous thou. milliinch",
         "tenth": "tenth tenths",
@@ -60,16 +61,20 @@ LONGEST_SIZE: Final = 400  # characters; what is longer is not a size
 _LAST_WORD: Final = re.compile(r"[_ ]([^_ ]+)$")
 _OTHER_SCALES: Final = {"f", "fahrenheit", "k", "kelvin", "r", "rankine", "℉"}
 _WORDS_OF: Final = re.compile(r"[^\W\d_]+")
-_GAUGES: Final = frozenset(["micrometer", "mikrometer", "micrometro", "micrómetro"])
+_GAUGES: Final = frozenset(
+    ["micrometer", "mikrometer", "micrometro", "micrómetro", "micromètre", "mikrometre", "mikrometr", "mikrométer"]
+)
+_THINGS: Final = frozenset(["cale", "palce"])
+"""Inches in Polish and Czech; in French a gauge block or a shim, in Polish the fingers of a gripper."""
 _UNMISTAKABLE: Final = frozenset(
-    ["mm", "µm", "мм", "мкм", "毫米", "微米", "英寸", "インチ"]
+    ["mm", "µm", "мм", "мкм", "inč", "inç", "毫米", "微米", "英寸", "インチ"]
     + [
         word
         for word, unit in _WORDS.items()
-        if len(word) > 3 and unit in {"mm", "um", "inch", "mil", "uin"} and word not in _GAUGES
+        if len(word) > 3 and unit in {"mm", "um", "inch", "mil", "uin"} and word not in _GAUGES | _THINGS
     ]
 )
-"""Words that mean a unit wherever they stand in a name; a micrometer is a gauge as well. Others do at its end only: *um* is a German word, *in* an English one."""
+"""Words that mean a unit wherever they stand in a name; a micrometer is a gauge as well, *cale* a gauge block. Others do at its end only: *um* is a German word, *in* an English one."""
 _AT_END: Final = re.compile(r"(?:[-_,;/ .:=|]|(?<=\d))(mm|MM|[uµμ]m|nm|cm|mils?|tenths?|[uµμ]in)$", re.IGNORECASE)
 _INCHES_AT_END: Final = re.compile(r"""(?:[_,;/:=|] ?|(?<=\d) ?)(in\.?|["″”]|'')$|(?<=\s)(["″”]|'')$""", re.IGNORECASE)
 _CAPITAL_WITHIN: Final = re.compile(r"(?<=[a-zß-ÿ])(?=[A-ZА-Я])")
@@ -104,8 +109,8 @@ _TOLERANCE: Final = re.compile(r"(?<![\w.,])\d+(?:[.,]\d+)?\s*(?:[uµμ]m|micron
 _OTHERS: Final = frozenset(
     re.findall(
         r"\S+",
-        """ft foot feet fuß fuss pied pieds yd yard yards dm decimeter decimeters decimetre decimetres furlong furlongs fathom fathoms mile
-    miles km angstrom angstroms px pixel pixels counts micro micros ångström ångströms micrometer mikrometer micrometro micrómetro µ μ mu my col cola palec imperial english customary
+        f"""ft foot feet fuß fuss pied pieds yd yard yards dm decimeter decimeters decimetre decimetres furlong furlongs fathom fathoms mile
+    miles km angstrom angstroms px pixel pixels counts micro micros ångström ångströms {" ".join(sorted(_GAUGES | _THINGS))} µ μ mu my col cola palec imperial english customary
     thousandths tenths nm kn ncm ° º deg °c ℃ % ‰ rpm psi""",
     )
 )
@@ -173,7 +178,7 @@ class UnknownUnit(Exception):
 def unit_of_name(name: str, said: str | None = None) -> str | None:
     """The unit that the name of a characteristic carries in its rows: *D1 [inch]*. Raises `Unreadable` for one that is not known.
 
-    said: the unit of its size by column, row, cell or person; then a word that may be no unit, such as in *Bore (top)*, is none.
+    said: the unit of its size by column, row, cell or person; then a word that may be no unit, such as in *Bore (top)* or *Hauteur cale*, is none.
     """
     try:
         return unit_in(name)
@@ -181,7 +186,7 @@ def unit_of_name(name: str, said: str | None = None) -> str | None:
         word = error.word.lower()
         if said and not (
             word in OTHER_UNITS
-            or word in _OTHERS
+            or word in _OTHERS - _THINGS
             or any(sign in ",/*×" or sign.isdigit() for sign in word)
             or "thou" in word
         ):

@@ -2,7 +2,7 @@
 
 import pytest
 
-from app.files.formats.units import LENGTHS, UnknownUnit, length_unit, unit_above, unit_in
+from app.files.formats.units import LENGTHS, UnknownUnit, length_unit, unit_above, unit_in, unit_of_name
 
 
 @pytest.mark.parametrize(
@@ -36,6 +36,9 @@ def test_what_is_no_length_is_none(word: str) -> None:
         ("Ra micro inch", "uin"), ('Ra µ"', "uin"), ("Ø 40 ±0,01 mm", "mm"), ("Flatness 0.01 mm", "mm"), ("M8x100", None), ("Bohrung E-3", None),
         ("Diámetro (micras)", "um"), ("Desvio (mícrons)", "um"), ("Odchylka [mikronů]", "um"), ("Bicie mikronów", "um"), ("Scostamento (micrometri)", "um"),
         ("Medida (polegadas)", "in"), ("Wymiar (cale)", "in"), ("Mitta tuumaa", "in"), ("Mål (tommer)", "in"), ("Medida (milímetros)", "mm"), ("Misura micrometro 3", None), ("Décimal", None),
+        ("Cale étalon 20", None), ("Cale 3", None), ("Palce chwytaka 2", None), ("Mikrometre ile", None), ("Micromètre 2", None), ("Mikrometr 3", None),
+        ("Hauteur cale [mm]", "mm"), ("Rozměr [palce]", "in"), ("Ölçüm (mikrometre)", "um"), ("Wymiar w calach", "in"), ("Wymiar w mikronach", "um"),
+        ("Rozměr v palcích", "in"), ("Rozměr v mikrometrech", "um"), ("Méret hüvelykben", "in"), ("Méret mikronban", "um"), ("Mitat tuumina", "in"), ("Ölçü inç", "in"), ("Mera inč", "in"),
         ("Micrometer reading", None), ("in_feed", None), ("Position in X", None), ("My size", None), ("CIRCLE1(Bore) X", None), ("Rectangle 1", None), ("Angle plate height", None), ("Max100", None), ('Bore "top"', None),
     ],
 )  # fmt: skip
@@ -88,6 +91,10 @@ def test_the_unit_of_a_header(header: str, unit: str | None) -> None:
         "Desvío en milésimas",
         "Dev (micros)",
         "Misura micrometro",
+        "Ölçüm mikrometre",
+        "Cote micromètre",
+        "Hauteur cale",
+        "Rozměr palce",
         "Odchylka v setiny",
     ]
     + [
@@ -104,6 +111,10 @@ def test_the_unit_of_a_header(header: str, unit: str | None) -> None:
 def test_a_unit_that_is_no_length_is_never_taken_for_mm(header: str) -> None:
     with pytest.raises(UnknownUnit):
         unit_in(header)
+
+
+def test_a_gauge_block_beside_sizes_of_a_known_unit_is_no_inch() -> None:
+    assert unit_of_name("Hauteur cale", "mm") is None
 
 
 @pytest.mark.parametrize(
