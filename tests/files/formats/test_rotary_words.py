@@ -125,6 +125,7 @@ def test_columns_of_before_and_after_are_told_apart() -> None:
         ("vor Optimierung", "nach Optimierung"),
         ("measured", "optimised"),
         ("uncompensated", "compensated"),
+        ("pred kompenzacijo", "po kompenzaciji"),
     ):
         (row,) = read_protocol("C axis\n" + table.format(before, after)).axes["C"].deviations
         assert (row.measured[0], row.optimised[0]) == (0.01, 0.02)
@@ -133,7 +134,23 @@ def test_columns_of_before_and_after_are_told_apart() -> None:
     assert len(made.unread) == 2
 
 
-@pytest.mark.parametrize("label", ["Lose, Winkelbereich Q432", "Backlash angle range", "Zračnost, kompenzacija"])
+@pytest.mark.parametrize(
+    "label", ["Lose, Winkelbereich Q432", "Backlash angle range", "Zračnost, kompenzacija", "Kompenzirana zračnost"]
+)
 def test_a_backlash_that_was_set_is_none_that_was_found(label: str) -> None:
     made = read_protocol(f"<h2>C axis</h2><p>{label}: 3</p>")
     assert (made.axes, len(made.unread)) == ({}, 1)
+
+
+@pytest.mark.parametrize(
+    ("label", "key"),
+    [
+        ("Standardno odstopanje po kompenzaciji", "scatter_after"),
+        ("Razpršenost po popravku", "scatter_after"),
+        ("Standardno odstopanje pred kompenzacijo", "scatter_before"),
+        ("Standardno odstopanje po oseh", "scatter_before"),
+    ],
+)
+def test_a_scatter_after_the_correction_in_slovene_is_told_from_that_before(label: str, key: str) -> None:
+    made = read_protocol(f"<h2>C os</h2><p>{label}: 0.0021</p>")
+    assert made.axes["C"].numbers == {key: 0.0021}
