@@ -381,9 +381,9 @@ def _stability(
     if baseline is not None and baseline.quantity == "deviation" and window.count:
         charted = control.charted(session, current, baseline, window)
         if charted.chart is not None:
-            inside = np.isin(charted.last, counted["sequence"])
-            z, rules = charted.chart.z[inside], control.rules_of(baseline)
-            return stability.stability(z, rules, frozen=True), baseline.version
+            z = charted.chart.z[np.isin(charted.last, counted["sequence"])]
+            if len(z):
+                return stability.stability(z, control.rules_of(baseline), frozen=True), baseline.version
     return or_refused(lambda: stability.of_readings(values)), None
 
 

@@ -1,5 +1,6 @@
 """The capability of a characteristic through the front door: by hand, by limits in force, and with the loop taken out."""
 
+from datetime import UTC, datetime, timedelta
 from random import Random
 from statistics import NormalDist
 from typing import Any
@@ -12,6 +13,7 @@ from app.loop.characteristics.queries import characteristic_named
 from app.quality.capability import verdict_queries
 from app.quality.capability.actions import JOB
 from app.quality.capability.verdict_queries import Verdict, verdicts_by_characteristic
+from tests.quality.chart_signals.line import Line
 from tests.quality.closed_loop import cut, scatter
 from tests.servers import Server
 from tests.shop import Person, Shop
@@ -470,3 +472,17 @@ def test_sigma_within_is_pooled_by_choice(shop: Shop, viewer: Person) -> None:
     report = shop.call("GET", f"/characteristics/{key}/report.json?section=capability&last=all&sigma_by=part")
     (fact,) = [fact for fact in report["sections"][0]["facts"] if fact["key"] == "sigma_within"]
     assert said in fact["note"]
+
+
+def test_a_window_of_which_no_point_of_the_chart_counts_is_judged_by_itself(
+    server: Server, shop: Shop, viewer: Person
+) -> None:
+    """Of a day that came late there are two probe faults only; between them came a reading of another day."""
+    line = Line(shop)
+    day = (datetime.now(UTC) - timedelta(days=9)).date()
+    late, other = f"{day}T10:00:00Z", f"{day + timedelta(days=2)}T10:00:00Z"
+    shop.push([1200.0, 0.0, 1200.0], line.key, measured_at=[late, other, late])
+    found = of(shop, f"from={day}&to={day}", line.key)
+    assert (found["readings"], found["stable"]) == (0, None)
+    assert "20 are missing" in found["refused"]
+    assert "20 are missing" in viewer.open(f"/characteristics/{line.key}/capability?from={day}&to={day}")
