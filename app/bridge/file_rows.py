@@ -132,25 +132,36 @@ def unnamed_times(columns: Mapping[str, str], table: Sequence[tuple[int, Found]]
     used = {part for column in columns.values() for part in parts_of(column, names)}
     cells = {name: [str(row.get(name) or "") for row in rows] for name in names if name not in used}
     sure, doubtful, counted = times_unnamed(cells, pattern, days)
+    too = _named_too(columns, names)
     if doubtful:
         reason = "hold dates, and columns.measured_at names none of them: name the one that is meant, or none, which means now"
         if days:
             reason = f"hold times, and {named} holds days alone: name the one that is meant, or {named}, which means midnight"
         fault = Fault(
-            None, ", ".join(doubtful), f'{reason}: columns.measured_at = "{doubtful[0]}", or "{named if days else ""}".'
+            None,
+            ", ".join(doubtful),
+            f'{reason}: columns.measured_at = "{doubtful[0]}", or "{named if days else ""}"{too}.',
         )
         return UnnamedTimes({}, [(0, fault)])
     line = table[0][0] if table else 0
     if counted:
         name, form = next(iter(counted.items()))
         said = f'columns.measured_at = "{name}"' + (f' and times = "{form}"' if form else "")
-        words = f'may be times, and columns.measured_at names none, which means now: set {said}, or columns.measured_at = ""'
+        words = f'may be times, and columns.measured_at names none, which means now: set {said}, or columns.measured_at = ""{too}'
         return UnnamedTimes({}, [(line, Remark(line, name, "", words))])
     other = f'columns.measured_at = "{named if days else ""}"'
-    words = f"holds dates and times and is taken for the time of measuring; if it is not, set {other}"
+    words = f"holds dates and times and is taken for the time of measuring; if it is not, set {other}{too}"
     return (
         UnnamedTimes({"measured_at": sure}, [(line, Remark(line, sure, "", words))]) if sure else UnnamedTimes({}, [])
     )
+
+
+def _named_too(columns: Mapping[str, str], names: Collection[str]) -> str:
+    """The other columns to configure beside one, where none is so far: then no field is found by its name any more."""
+    if any(field != column for field, column in columns.items()) or len(columns) < len(FIELDS):
+        return ""
+    others = [f'columns.{field} = "{field}"' for field in FIELDS if field in names and field != "measured_at"]
+    return f"; and beside it {', '.join(others)}" if others else ""
 
 
 def unit_in_doubt(word: str) -> str:

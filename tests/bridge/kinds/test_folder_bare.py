@@ -1,5 +1,6 @@
 """Folders with tables that say less than others: without a heading, or with times that the configuration does not name."""
 
+import re
 from pathlib import Path
 from typing import Any
 
@@ -110,3 +111,24 @@ def test_numbers_that_may_be_times_are_said(tmp_path: Path) -> None:
     assert "tick: may be times" in " ".join(content.remarks)
     assert 'columns.measured_at = "tick" and times = "seconds since 1970-01-01"' in " ".join(content.remarks)
     assert read(tmp_path, text, columns={"measured": "actual", "measured_at": ""}, names=ONE).remarks == []
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "measured;part;measured_at;stamp\n40,01;A;23.11.2026;23.11.2026 06:05:00\n40,02;B;23.11.2026;24.11.2026 06:06:00\n",
+        "measured;part;stamp\n40,01;A;23.11.2026 06:05:00\n40,02;B;23.11.2026 06:06:00\n",
+        "measured;part;begin;end\n40,01;A;23.11.2026 06:05:00;23.11.2026 06:06:00\n40,02;B;23.11.2026 07:05:00;23.11.2026 07:06:00\n",
+        "measured;part;tick\n40,01;A;1763442300\n40,02;B;1763442393\n40,02;C;1763442481\n",
+    ],
+)
+def test_what_is_said_of_times_where_columns_names_none_can_be_followed(tmp_path: Path, text: str) -> None:
+    """Where `columns` names one field, no other is found by its name: the sentence names them too."""
+    content = read(tmp_path, text, columns={}, names=ONE)
+    said = " ".join([*map(str, content.faults), *content.remarks])
+    columns = dict(re.findall(r'columns\.(\w+) = "([^"]*)"', said))
+    form = re.search(r' times = "([^"]+)"', said)
+    assert columns.keys() == {"measured", "part", "measured_at"}
+    followed = read(tmp_path, text, columns=columns, names=ONE, times=form and form[1])
+    assert bodies(followed)[:2] != []
+    assert [each.body["part"] for each in followed.entries][:2] == ["A", "B"]
