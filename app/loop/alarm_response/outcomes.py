@@ -101,7 +101,5 @@ def _followed(item: dict[str, Any], half: float | None) -> str:
         values["found"] = found_by_hand(item.get("measured"), item.get("good"))
     count = item["parts"] if code == "tool_restarted" else max(map(len, listed.values()))
     if code in _SENTENCES:
-        text = _SENTENCES[code](count)
-    else:
-        text = next((kind.outcomes[code](item) for kind in kinds() if code in kind.outcomes), str(code))
-    return text.format(**values)
+        return _SENTENCES[code](count).format(**values)
+    return next((kind.outcomes[code](item) for kind in kinds() if code in kind.outcomes), str(code))
