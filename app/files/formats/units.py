@@ -64,6 +64,7 @@ _WORDS_OF: Final = re.compile(r"[^\W\d_]+")
 _GAUGES: Final = frozenset(
     ["micrometer", "mikrometer", "micrometro", "micrómetro", "micromètre", "mikrometre", "mikrometr", "mikrométer"]
 )
+_IN_GAUGES: Final = re.compile(rf"\b(?:in|en|em|w|v|u)\s+({'|'.join(sorted(_GAUGES))})\b", re.IGNORECASE)
 _THINGS: Final = frozenset(["cale", "palce"])
 """Inches in Polish and Czech; in French a gauge block or a shim, in Polish the fingers of a gripper."""
 _UNMISTAKABLE: Final = frozenset(
@@ -249,7 +250,7 @@ def _in_one_word(name: str) -> str:
 def _unmistakable(text: str) -> list[str]:
     """The words of a text that mean a unit of length wherever they stand, as they are written."""
     words = _WORDS_OF.findall(_CAPITAL_WITHIN.sub(" ", text.replace("\N{GREEK SMALL LETTER MU}", "\N{MICRO SIGN}")))
-    return [word for word in words if word.lower() in _UNMISTAKABLE and length_unit(word)]
+    return [word for word in words if word.lower() in _UNMISTAKABLE and length_unit(word)] + _IN_GAUGES.findall(text)
 
 
 @lru_cache(maxsize=4096)

@@ -39,6 +39,7 @@ def test_what_is_no_length_is_none(word: str) -> None:
         ("Cale étalon 20", None), ("Cale 3", None), ("Palce chwytaka 2", None), ("Mikrometre ile", None), ("Micromètre 2", None), ("Mikrometr 3", None),
         ("Hauteur cale [mm]", "mm"), ("Rozměr [palce]", "in"), ("Ölçüm (mikrometre)", "um"), ("Wymiar w calach", "in"), ("Wymiar w mikronach", "um"),
         ("Rozměr v palcích", "in"), ("Rozměr v mikrometrech", "um"), ("Méret hüvelykben", "in"), ("Méret mikronban", "um"), ("Mitat tuumina", "in"), ("Ölçü inç", "in"), ("Mera inč", "in"),
+        ("Écart en micromètre, D1", "um"), ("Deviation in micrometer, nest 1", "um"), ("Desvio em micrómetro", "um"), ("Mesuré au micromètre 2", None), ("Main micrometer 2", None),
         ("Micrometer reading", None), ("in_feed", None), ("Position in X", None), ("My size", None), ("CIRCLE1(Bore) X", None), ("Rectangle 1", None), ("Angle plate height", None), ("Max100", None), ('Bore "top"', None),
     ],
 )  # fmt: skip
