@@ -277,6 +277,16 @@ HEARTBEAT: dict[str, Any] = {
 }
 
 
+def routes() -> set[str]:
+    """Every address that answers GET, for people and for programs."""
+    from fastapi.routing import APIRoute
+
+    from app.main import ROUTERS
+
+    found = [route for router in ROUTERS for route in router.routes if isinstance(route, APIRoute)]
+    return {route.path for route in found if "GET" in (route.methods or ())}
+
+
 def furnished(server: Server) -> Shop:
     """A machine with something of everything: a worn tool, held and pending corrections, a long name, no data."""
     made = Shop(server)

@@ -16,7 +16,7 @@ from pypdf import PdfReader
 
 from app.access import devices
 from tests.browsers import new_page
-from tests.pages.house import ADDRESSES, PAGES, furnished, values_of
+from tests.pages.house import ADDRESSES, PAGES, furnished, routes, values_of
 from tests.pages.looks import (
     SIZES,
     STATES,
@@ -100,13 +100,7 @@ WHOLE = Looks(tuple(sorted(SIZES, key=SIZES.__getitem__)), STATES, ("phone", "pa
 
 def pages_of_the_house() -> set[str]:
     """The addresses that answer with a page: GET routes that are not for programs."""
-    from fastapi.routing import APIRoute
-
-    from app.main import ROUTERS
-
-    routes = [route for router in ROUTERS for route in router.routes if isinstance(route, APIRoute)]
-    found = {route.path for route in routes if "GET" in (route.methods or ())}
-    return {path for path in found if not path.startswith(("/api/v1/", "/health/", "/metrics"))}
+    return {path for path in routes() if not path.startswith(("/api/v1/", "/health/", "/metrics"))}
 
 
 def test_no_page_is_forgotten() -> None:

@@ -101,7 +101,7 @@ def differ(values: ArrayLike, labels: NDArray[np.int64]) -> Difference | NoAnswe
     >>> differ(drift, np.arange(220) // 110)
     <NoAnswer.APART: 'apart'>
     """
-    x, label = checked(values), np.asarray(labels)
+    x, label = checked(values, 0), np.asarray(labels)
     if len(np.unique(label[label >= 0])) < 2:
         return NoAnswer.ONE
     many = len(x) // STRIDE

@@ -106,3 +106,7 @@ def test_readings_far_apart_are_no_neighbours_though_those_between_say_nothing()
     rng, labels = np.random.default_rng(19), np.full(5_000, -1)
     labels[::50] = rng.integers(0, 2, 100)
     assert differ(rng.normal(0, 1, 5_000) + 0.01 * (np.arange(5_000) % 700), labels) is NoAnswer.APART
+
+
+def test_of_no_reading_there_are_no_two_strata() -> None:
+    assert differ(np.array([]), np.array([], np.int64)) is NoAnswer.ONE
