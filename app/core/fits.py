@@ -130,26 +130,6 @@ def fit_of(text: str) -> Fit | None:
     return Fit(nominal, round(upper / 1000, 7) + 0.0, round((upper - width) / 1000, 7) + 0.0)
 
 
-_IN_NAME = re.compile(r"(?<![\w.,/-])[ØøΦφ⌀]?\s?[0-9.,]{1,20}\s?(?:[A-Z]{1,2}|[a-z]{1,2})[1-9][0-9]?(?![\w.,/])")
-_DIAMETER = re.compile(r"[ØøΦφ⌀]\s?([0-9]{1,4}(?:[.,][0-9]{1,6})?)(?![\w.,]{0,20}\d)")
-
-
-def in_name(name: str) -> dict[str, float]:
-    """Proposal of what the name of a characteristic says about its size: nominal and deviations, mm, or the nominal alone.
-
-    A number by itself may count bores as well as measure one, so only a tolerance class or a diameter sign makes it a size;
-    several of them propose nothing.
-
-    >>> in_name("Bore 30 H7"), in_name("Seat Ø40"), in_name("Bore 2"), in_name("Seat 40 h6 to 30 h6")
-    ({'nominal': 30.0, 'upper_deviation': 0.021, 'lower_deviation': 0.0}, {'nominal': 40.0}, {}, {})
-    """
-    fits = [fit for text in _IN_NAME.findall(name) if (fit := fit_of(text)) is not None]
-    if fits:
-        return fits[0]._asdict() if len(fits) == 1 else {}
-    sizes = [number_or_none(text) for text in _DIAMETER.findall(name)]
-    return {"nominal": sizes[0]} if len(sizes) == 1 and sizes[0] else {}
-
-
 def with_fit(given: Mapping[str, Any]) -> dict[str, Any]:
     """Parameters with a tolerance class that is in the nominal size (R42) written as numbers.
 

@@ -10,7 +10,8 @@ from sqlalchemy.orm import Session
 from starlette.responses import RedirectResponse
 
 from app.access.deps import Caller, Engineer, Viewer, require
-from app.core.fits import fit_of, in_name
+from app.core.fits import fit_of
+from app.core.named_size import size_in_name
 from app.core.natural_limit import looks_natural
 from app.core.parameters import AVERAGE_LOCATIONS, BY_NAME, Mode, Parameters
 from app.core.plausibility import suggested_jump
@@ -330,7 +331,7 @@ def named(name: Annotated[str, Query(max_length=200)]) -> dict[str, str]:
     """Proposal of the sizes that follow from a name: 0 as the natural limit of roundness, run-out, straightness; else its size."""
     if looks_natural(name):
         return {"natural_limit": "lower", "nominal": "0", "lower_deviation": "0"}
-    return _as_typed(in_name(name))
+    return _as_typed(size_in_name(name))
 
 
 def _suggested_jump(session: Session, current: queries.CurrentCharacteristic) -> float | None:
