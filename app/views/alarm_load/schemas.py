@@ -5,6 +5,7 @@ from typing import Annotated, Self
 
 from pydantic import BaseModel, Field
 
+from app.access.callers import Caller
 from app.core.alarm_load import LoadVerdict
 from app.views.alarm_load import wording
 from app.views.alarm_load.queries import AlarmLoad, Loud, Position
@@ -60,7 +61,12 @@ class LoudAlarmOut(BaseModel):
     alarms: Annotated[int, Field(description="Alarms raised in the period.")]
     share: Annotated[float, Field(description="Their share of all.")]
     chatters: Annotated[bool, Field(description="It has happened three times or more in a minute.")]
-    made_by: Annotated[str, Field(description="Rule or parameter by which it is raised, in words.")]
+    made_by: Annotated[
+        str,
+        Field(
+            description="Rule or parameter by which it is raised, in words; a setting by its name for administrators."
+        ),
+    ]
     quieter: Annotated[str, Field(description="What a quieter setting would have done, in words.")]
     quieter_left: Annotated[
         int | None,
@@ -68,7 +74,7 @@ class LoudAlarmOut(BaseModel):
     ]
 
     @classmethod
-    def of(cls, found: Loud) -> Self:
+    def of(cls, found: Loud, caller: Caller) -> Self:
         """As it is answered."""
         return cls(
             kind=found.cause.kind,
@@ -78,7 +84,7 @@ class LoudAlarmOut(BaseModel):
             alarms=found.noise.alarms,
             share=found.noise.share,
             chatters=found.noise.chatters,
-            made_by=wording.made_by(found.cause.kind),
+            made_by=wording.made_by(found.cause.kind, caller),
             quieter=wording.quieter_words(found),
             quieter_left=found.quieter.left if found.quieter else None,
         )
@@ -96,7 +102,7 @@ class AlarmLoadOut(BaseModel):
     stale: Annotated[list[int], Field(description="Numbers of the stale alarms, the oldest first.")]
 
     @classmethod
-    def of(cls, found: AlarmLoad) -> Self:
+    def of(cls, found: AlarmLoad, caller: Caller) -> Self:
         """As it is answered."""
         assert found.period.start is not None
         assert found.period.end is not None
@@ -106,6 +112,6 @@ class AlarmLoadOut(BaseModel):
             enough=found.enough,
             cut=found.cut,
             positions=[AlarmPositionOut.of(each) for each in found.positions],
-            top=[LoudAlarmOut.of(each) for each in found.top],
+            top=[LoudAlarmOut.of(each, caller) for each in found.top],
             stale=[each.alarm.id for each in found.stale],
         )

@@ -1,5 +1,6 @@
 """The words of the load by alarms: what makes an alarm, where that is set, and what a quieter setting would have done."""
 
+from app.access.callers import Caller
 from app.core.alarm_load import LoadVerdict
 from app.language.i18n import _
 from app.views.alarm_load.queries import REPLAYED, Loud
@@ -14,8 +15,18 @@ def verdict_word(verdict: LoadVerdict) -> str:
     }[verdict]
 
 
-def made_by(kind: str) -> str:
-    """The rule or parameter by which alarms of a kind are raised."""
+SETTINGS = {
+    "corrections_not_taken": "INBAND_CORRECTIONS_TAKEN_WITHIN",
+    "bridge_silent": "INBAND_BRIDGE_SILENT_AFTER",
+    "bridge_backing_up": "INBAND_BRIDGE_BACKLOG_AFTER",
+}
+"""Settings of the server by which alarms of a kind are raised."""
+
+
+def made_by(kind: str, caller: Caller) -> str:
+    """The rule or parameter by which alarms of a kind are raised; a setting by its name for who may change it."""
+    if kind in SETTINGS and caller.may("admin"):
+        return SETTINGS[kind]
     return {
         "oversize": _("tolerance R35, reached in spite of R33, R34 and k"),
         "undersize": _("tolerance R35, reached in spite of R33, R34 and k"),
@@ -32,14 +43,14 @@ def made_by(kind: str) -> str:
         "correction_in_doubt": _("what the machine says is in effect"),
         "unusual_gain": _("factor"),
         "characteristics_disagree": _("targets and empirical values of two characteristics"),
-        "corrections_not_taken": _("INBAND_CORRECTIONS_TAKEN_WITHIN"),
+        "corrections_not_taken": _("time allowed for taking a correction; ask an administrator"),
         "tool_life": _("planned life of the edge"),
         "measurement_missed": _("control plan"),
         "context_missing": _("control plan"),
         "hunting": _("zero range R33 and k"),
         "signal": _("run rule"),
-        "bridge_silent": _("INBAND_BRIDGE_SILENT_AFTER"),
-        "bridge_backing_up": _("INBAND_BRIDGE_BACKLOG_AFTER"),
+        "bridge_silent": _("time a bridge may be silent; ask an administrator"),
+        "bridge_backing_up": _("time a reading may wait in a bridge; ask an administrator"),
         "bridge_quarantine": _("refusal of readings"),
         "readings_late": _("network of the machine"),
         "server_away": _("server or database"),
