@@ -204,7 +204,6 @@ def of_protocol(text: str, protocol: Protocol | None = None) -> Evaluated:
         raise Invalid.at(
             "protocol",
             _("nothing of a rotary axis can be read in it: {notes}").format(notes=notes or _("it is empty")),
-            do=_("Send TCHPRAUTO.html as the control has written it, in German, English or Slovene.")
-            + wording.labels_to_add(protocol.unread),
+            do=_("Send TCHPRAUTO.html as the control has written it.") + wording.labels_to_add(protocol.unread),
         )
     return evaluated
