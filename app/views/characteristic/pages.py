@@ -49,7 +49,7 @@ from app.views.characteristic.decisions import Decision, decision, decisions, ve
 from app.views.characteristic.figures import angle_of, residuals_of, touches_picture
 from app.views.characteristic.figures_api import ResultName
 from app.views.characteristic.glance import band_picture
-from app.views.characteristic.wording import code_word, next_action, reading_link, state_word
+from app.views.characteristic.wording import code_word, next_action, reading_link, result_short, state_word
 from app.web.choice import Choice, ChosenOnPage
 from app.web.deps import Before, FormDep, SessionDep
 from app.web.fields import LARGEST_ID, Reason
@@ -209,7 +209,8 @@ def characteristic_page(
         most=MOST_IN_HISTOGRAM,
         link=link,
         chart_url=f"/api/v1{path}/figures/{figure}?{urlencode(chart_query)}",
-        results=[(result_label(name), link(result=name), name == drawn_result) for name in yielded],
+        results=[(result_short(name), link(result=name), name == drawn_result) for name in yielded],
+        drawn_result=drawn_result and result_label(drawn_result),
         result_url=f"/api/v1{path}/figures/results?{urlencode(chosen | {'result': drawn_result})}",
         histogram_url=f"/api/v1{path}/figures/histogram?{urlencode(chosen)}",
         may_edit=caller.may("engineer"),

@@ -1,10 +1,11 @@
-"""The words of the states, and of the next action."""
+"""The words of the states, of the next action, and of the choices."""
 
 from typing import NamedTuple
 
 from app.core.state import CharacteristicState
 from app.language.formatting import read_um
 from app.language.i18n import _
+from app.loop.characteristics.wording import result_label
 from app.views.characteristic.state_queries import CharacteristicRow
 
 
@@ -72,3 +73,14 @@ def code_word(action: str) -> str:
         "hold": _("Correction held"),
         "stop": _("Stop asked for"),
     }.get(action, action)
+
+
+def result_short(name: str) -> str:
+    """Name of a variant's result where several stand side by side on a phone."""
+    return {
+        "out_of_roundness": _("Out of round"),
+        "taper": _("Taper"),
+        "straightness": _("Straightness"),
+        "repeat_range": _("Range"),
+        "repeat_deviation": _("Std dev."),
+    }.get(name) or result_label(name)

@@ -3,7 +3,7 @@
 from typing import Any
 
 import pytest
-from playwright.sync_api import Page
+from playwright.sync_api import Page, expect
 from sqlalchemy import text
 
 from app.charts import to_plotly
@@ -18,7 +18,7 @@ from app.views.characteristic.figures import (
     touches_picture,
     zone_chart,
 )
-from tests.pages.looks import boxes
+from tests.pages.looks import boxes, resize
 from tests.servers import Server
 from tests.shop import Person, Shop
 
@@ -168,6 +168,17 @@ class TestPages:
         assert "starts at" in page
         assert "1 rejected by this tool" in viewer.open(f"/plant/{shop.machine}")
         assert "Parts rejected" not in viewer.open(f"/characteristics/{shop.characteristic}")
+
+    def test_results_to_choose_from_take_one_line_of_a_phone(self, shop: Shop, server: Server, page: Page) -> None:
+        name = f"{shop.characteristic}-r"
+        shop.add(name, variant="round", points=2, repeats=2, average_memory=0)
+        shop.call("POST", "/readings", 201, characteristic=name, touches=[[40.0, 40.001], [40.002, 40.002]])
+        Person(server, "viewer").sign_in(page)
+        resize(page, "phone")
+        page.goto(f"/characteristics/{name}")
+        expect(page.get_by_role("heading", name="Out-of-roundness")).to_be_visible()
+        tops = {box["top"] for box in boxes(page, "#results .choice a")}
+        assert (len(boxes(page, "#results .choice a")), len(tops)) == (3, 1)
 
     def test_a_reading_shows_every_touch_and_where_it_lies(self, shop: Shop, server: Server) -> None:
         name = f"{shop.characteristic}-i"
