@@ -30,7 +30,7 @@ _LIKE_A_DATE = re.compile(r"\d[-./]\s?\d{1,2}[-./]|[^\W\d_]{3}|\dT\d")
 _DATE_AND_TIME = re.compile(r"\d{1,4}([-./])\s?\d{1,2}\1\s?\d{1,4}\.?[\sT,]+\d{1,2}:\d{2}")
 _NUMBER = re.compile(r"\d{5,14}(?:[.,]\d+)?", re.ASCII)
 _COUNTED_YEARS = 2000, 2040  # between them a count is a time
-_SECONDS = 946_684_800, 2_208_988_800
+_SECONDS = 946_684_800, 2_000_000_000  # to 2033; from there on numbers of parts such as 2025111801 begin
 _DAYS = 36_526, 51_136
 _FEWEST_STEPS = 2
 _ZEROS = re.compile(r"0{1,4}([./-])0{1,2}\1 ?0{1,4}\.?(?:[/ .,T]+0{1,2}(?::0{1,2}){1,2}(?:[.,]0+)?)?[/Zz]?")
@@ -220,7 +220,7 @@ def _day_of(cell: str, pattern: str | None, order: DayOrder | None = None, *, mi
 
 
 def _count(cells: Sequence[str]) -> str | None:
-    """The form by which numbers may be times: they go one way, from 2000 to 2040, and not by one as numbers of parts do.
+    """The form by which numbers may be times: they go one way, from 2000 on, and not by one as numbers of parts do.
 
     Days of spreadsheets have a fraction, the time of day, and there are more of them: a size in micrometres is as large.
     """
