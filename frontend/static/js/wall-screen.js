@@ -9,6 +9,8 @@ const PATIENCE = 15_000; // ms for one answer
 const CALM = 5_000; // ms without an answer before it is said in red
 const SMALLEST = 0.4; // share of their usual size that letters have at least
 const PHONE = 1_000; // px; one scrolls on narrower screens
+const URGENT = ["waiting", "attention", "wear", "stop"]; // tones, the calmest of them first
+const urgency = (machine) => URGENT.indexOf(machine.dataset.tone);
 const REFUSED = 60_000; // ms between two looks with a key that was refused
 
 class WallScreen extends HTMLElement {
@@ -59,11 +61,21 @@ class WallScreen extends HTMLElement {
     this.fit();
   }
 
-  // Nobody scrolls a screen on the wall: where there is more than it holds, the letters are smaller.
+  // Nobody scrolls a screen on the wall: where there is more than it holds, the letters are smaller, and then machines are counted
+  // in place of shown, the calm ones first.
   fit() {
+    const fits = () => innerWidth <= PHONE || document.documentElement.scrollHeight <= innerHeight;
     for (let share = 1; share >= SMALLEST; share -= 0.05) {
       document.body.style.setProperty("--fit", share.toFixed(2));
-      if (innerWidth <= PHONE || document.documentElement.scrollHeight <= innerHeight) return;
+      if (fits()) return;
+    }
+    const notShown = this.querySelector("#not-shown");
+    const machines = [...this.querySelectorAll(".wall-machines li")].reverse();
+    for (const machine of machines.sort((one, other) => urgency(one) - urgency(other)).slice(0, -1)) {
+      if (fits()) return;
+      machine.remove();
+      notShown.hidden = false;
+      notShown.lastElementChild.textContent = Number(notShown.lastElementChild.textContent) + 1;
     }
   }
 

@@ -17,7 +17,7 @@ from app.loop.maintenance.tables import Maintenance
 from app.loop.tables.alarms import Alarm
 from app.views.wall import queries
 from app.views.wall.pages import MOST, WITHIN, Rate
-from tests.servers import Server
+from tests.servers import RunServer, Server
 from tests.shop import Person, Shop, unique
 
 pytestmark = pytest.mark.own_server  # what can be read from afar of all machines of other files fits on no screen
@@ -197,3 +197,21 @@ def test_it_says_since_when_it_is_old_goes_on_and_ends_when_revoked(
     page.clock.fast_forward(6_000)
     expect(trouble).to_contain_text("revoked")
     expect(tile).to_be_hidden()
+
+
+def test_machines_that_do_not_fit_are_counted_the_calm_ones_first(
+    stranger: BrowserContext, run_server: RunServer
+) -> None:
+    """Nobody scrolls a screen on the wall, so what is below its edge is not seen."""
+    with run_server() as server:
+        shops = [Shop(server) for _machine in range(12)]
+        shops[-1].read(12.0)
+        screen = shops[0].call("POST", "/wall-screens", 201, name=unique("Hall"))
+        page = stranger.new_page()
+        page.set_viewport_size({"width": 1280, "height": 300})
+        page.goto(f"{server.url}/wall#{screen['url'].partition('#')[2]}")
+        expect(page.locator("#not-shown")).to_be_visible()
+        assert page.evaluate("document.documentElement.scrollHeight <= innerHeight")
+        shown = page.locator(".wall-machines li").count()
+        assert shown + int(page.locator("#not-shown span").inner_text()) == len(shops)
+        expect(page.locator('.wall-machines li[data-tone="attention"]')).to_contain_text("Oversize")
