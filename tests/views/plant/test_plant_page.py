@@ -189,6 +189,27 @@ class TestLive:
             expect(line(page, shop)).to_contain_text(shown)
             assert boxes(page, row)[0]["height"] == before, shown
 
+    @pytest.mark.parametrize("size", ["desk", "phone"])
+    def test_a_row_keeps_its_height_when_a_part_is_rejected(
+        self, shop: Shop, viewer: Person, page: Page, size: str
+    ) -> None:
+        accepted = {"points": 3, "accept": {"n": 2, "m": 3}, "zero_range": 0, "weighting_factor": 1}
+        name = shop.another("n-of-m", average_memory=0, **accepted)
+
+        def read(*sizes: float) -> None:
+            shop.call("POST", "/readings", 201, characteristic=name, touches=[[size] for size in sizes])
+
+        read(40.0, 40.0, 40.0)
+        viewer.sign_in(page)
+        resize(page, size)
+        page.goto(f"/plant/{shop.machine}")
+        live(page)
+        expect(page.locator(f"#c-{name}")).to_contain_text("0 rejected by this tool")
+        before = boxes(page, f"#c-{name}")[0]["height"]
+        read(40.02, 40.02, 40.0)
+        expect(page.locator(f"#c-{name}")).to_contain_text("1 rejected by this tool")
+        assert boxes(page, f"#c-{name}")[0]["height"] == before
+
     def test_a_new_characteristic_appears(self, shop: Shop, viewer: Person, page: Page) -> None:
         viewer.sign_in(page)
         page.goto("/")
